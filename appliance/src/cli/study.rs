@@ -334,9 +334,9 @@ impl ProcessOptions {
                 };
                 warn_of_undated(&reader, &filter)?;
                 let rest = if StateFolder::is_used(&state) {
-                    Rest::OfStation
+                    Rest(3)
                 } else {
-                    Rest::None
+                    Rest(0)
                 };
                 let of_studies = Studies::of(&state).seqs(&reader.id()?);
                 reader.courses(&filter, self.slot, bounds, &of_studies, rest)?

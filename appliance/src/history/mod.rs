@@ -29,6 +29,7 @@ mod recordings;
 pub mod schema;
 pub mod seqs;
 mod spool;
+pub mod statistics;
 pub mod studies;
 mod task;
 pub mod writer;

@@ -47,8 +47,8 @@ pub fn of(distances: &[f64], tests: &[u8]) -> Vec<(usize, u8)> {
     (0..distances.len()).flat_map(marked).collect()
 }
 
-/// Whether the last of these values completes what a test looks for.
-fn is_marked(distances: &[f64], test: u8) -> bool {
+/// Whether the last of these values, of which at least the last fifteen are there, completes what a test looks for.
+pub fn is_marked(distances: &[f64], test: u8) -> bool {
     let last = |n: usize| {
         distances
             .len()

@@ -3,7 +3,7 @@
 //! ```text
 //! CSV, history, guided study ──► table ──► capability     C_g, C_gk, Q_MS of one reference part
 //!                                     ├──► repeatability  Gage R&R of parts, appraisers and trials
-//!                                     └──► process        P_p, P_pk, C_p, C_pk, control limits, marks
+//!                                     └──► process        P_p, P_pk, C_p, C_pk, control limits, marks (group, drift)
 //! ```
 //!
 //! They know no station, recipe or database. Numbers stay decimal until they are differences ([`decimal`]); distributions
@@ -13,6 +13,8 @@ mod balanced;
 pub mod capability;
 pub mod decimal;
 pub mod distribution;
+pub mod drift;
+pub mod group;
 pub mod marks;
 pub mod process;
 pub mod repeatability;

@@ -1,31 +1,15 @@
-//! What a process does over time: P_p, P_pk, C_p, C_pk, individuals and moving ranges, Shewhart's marks.
+//! What a process does over time, value by value: figures of each group ([`super::group`]), and Shewhart's marks.
 //!
-//! ```text
-//! P_p = (U − L)/6s      P_pk = min(U − x̄, x̄ − L)/3s      C_p and C_pk the same with σ = M̄R̄/1.128
-//! C_p √(χ²_{α/2, ν}/ν) to C_p √(χ²_{1−α/2, ν}/ν)           C_pk ± 1.96 √(1/9n + C_pk²/2ν)          ν = n − 1
-//! x̄ ± 3σ, ranges up to 3.267 M̄R̄
-//! ```
-//!
-//! Sources: Montgomery, *Introduction to Statistical Quality Control*; Bissell 1990 for the interval of C_pk. GroupValues are in
-//! the order of their results; where the limits change, a new group begins, and no figure mixes two groups.
+//! Values are in the order of their results; where the limits change, a new group begins, and no figure mixes two groups.
 
 use super::decimal::Decimal;
-use super::distribution::{self, Tail};
+use super::group::{Capability, LimitPair, ProcessGroup, RunningGroup};
 use super::marks::{self, Mark};
-use super::spread::{Spread, defined};
 use super::text::{rounded, short, shown, titled};
 use super::values::{Characteristic, LeftOut};
-use super::verdict::{Prediction, Squares, compared};
+use super::verdict::compared;
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
-
-/// Mean moving range of two values over σ.
-const RANGE_OF_TWO: f64 = 1.128;
-/// Largest moving range over their mean.
-const LARGEST_RANGE: f64 = 3.267;
-
-/// The limits of a characteristic.
-pub type LimitPair = (Option<Decimal>, Option<Decimal>);
 
 /// The values of one characteristic as they come, divided where its limits change.
 #[derive(Clone, Debug, Default)]
@@ -39,28 +23,12 @@ pub struct Course {
     groups: Vec<GroupValues>,
 }
 
-/// GroupValues that were judged by the same limits, as offsets from the first.
+/// A group with its values, as offsets from the first.
 #[derive(Clone, Debug)]
 struct GroupValues {
-    bounds: LimitPair,
-    first: Decimal,
-    /// The first value, rounded to binary.
-    binary: f64,
+    sums: RunningGroup,
     offsets: Vec<f64>,
     at: Vec<u64>,
-    sigmas: Squares,
-    us: Squares,
-}
-
-/// A figure with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Capability {
-    /// The figure.
-    pub value: f64,
-    /// Lower end.
-    pub from: f64,
-    /// Upper end.
-    pub to: f64,
 }
 
 /// A process.
@@ -72,51 +40,8 @@ pub struct Process {
     pub unit: String,
     /// How many results were left out.
     pub left_out: LeftOut,
-    /// GroupValues by the limits that they were judged by, in the order of time.
+    /// Values by the limits that they were judged by, in the order of time.
     pub groups: Vec<ProcessGroup>,
-}
-
-/// GroupValues that were judged by the same limits. What cannot be formed is none.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ProcessGroup {
-    /// Lower limit.
-    pub low: Option<f64>,
-    /// Upper limit.
-    pub high: Option<f64>,
-    /// SEQ of the first value, or its line.
-    pub first: u64,
-    /// The same of the last.
-    pub last: u64,
-    /// How many values.
-    pub n: usize,
-    /// x̄.
-    pub mean: f64,
-    /// Standard deviation of all.
-    pub s: Option<f64>,
-    /// Mean moving range.
-    pub mean_range: Option<f64>,
-    /// σ by the moving range.
-    pub sigma: Option<f64>,
-    /// P_p.
-    pub pp: Option<Capability>,
-    /// P_pk.
-    pub ppk: Option<Capability>,
-    /// C_p.
-    pub cp: Option<Capability>,
-    /// C_pk.
-    pub cpk: Option<Capability>,
-    /// Control limits of the values.
-    pub control: Option<[f64; 2]>,
-    /// Control limit of the moving ranges.
-    pub largest_range: Option<f64>,
-    /// What was predicted of the measurement; s is that of the process.
-    pub prediction: Option<Prediction>,
-    /// GroupValues that stand out.
-    pub marks: Vec<Mark>,
-    /// The values.
-    pub individuals: Vec<f64>,
-    /// Each but the first against the one before.
-    pub moving_ranges: Vec<f64>,
 }
 
 impl Course {
@@ -158,7 +83,7 @@ impl Course {
         u: Option<f64>,
     ) {
         let group = self.group(bounds, || Some(value));
-        let offset = value.minus(group.first);
+        let offset = value.minus(group.sums.first());
         group.add(at, offset, sigma, u);
     }
 
@@ -172,8 +97,7 @@ impl Course {
         u: Option<f64>,
     ) {
         let group = self.group(bounds, || Decimal::of(value));
-        let offset = value - group.binary;
-        if offset.is_finite() {
+        if let Some(offset) = group.sums.offset(value) {
             group.add(at, offset, sigma, u);
         }
     }
@@ -187,10 +111,13 @@ impl Course {
         if self
             .groups
             .last()
-            .is_none_or(|group| group.bounds != bounds)
+            .is_none_or(|group| group.sums.bounds() != bounds)
         {
-            self.groups
-                .push(GroupValues::new(bounds, first().unwrap_or_default()));
+            self.groups.push(GroupValues {
+                sums: RunningGroup::new(bounds, first().unwrap_or_default()),
+                offsets: Vec::new(),
+                at: Vec::new(),
+            });
         }
         let last = self.groups.len() - 1;
         &mut self.groups[last]
@@ -212,103 +139,32 @@ impl Course {
 }
 
 impl GroupValues {
-    fn new(bounds: LimitPair, first: Decimal) -> Self {
-        let (offsets, at) = (Vec::new(), Vec::new());
-        Self {
-            bounds,
-            first,
-            binary: first.to_f64(),
-            offsets,
-            at,
-            sigmas: Squares::default(),
-            us: Squares::default(),
-        }
-    }
-
     fn add(&mut self, at: u64, offset: f64, sigma: Option<f64>, u: Option<f64>) {
+        self.sums.add(at, offset, sigma, u);
         self.offsets.push(offset);
         self.at.push(at);
-        self.sigmas.add(sigma);
-        self.us.add(u);
     }
 
     fn figures(&self, tests: &[u8]) -> ProcessGroup {
-        let spread = Spread::of(&self.offsets);
-        let (n, df, s) = (spread.n, spread.df(), spread.s());
-        let ranges: Vec<f64> = self
+        let distances: Option<Vec<f64>> = self
             .offsets
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]).abs())
+            .iter()
+            .map(|offset| self.sums.distance(*offset))
             .collect();
-        let mean_range = Some(Spread::of(&ranges).mean).filter(|_| !ranges.is_empty());
-        let sigma = mean_range.map(|range| range / RANGE_OF_TWO);
-        let (low, high) = self.bounds;
-        let below = low.map(|low| self.first.minus(low) + spread.mean);
-        let above = high.map(|high| high.minus(self.first) - spread.mean);
-        let nearest = match (below, above) {
-            (Some(below), Some(above)) => Some(below.min(above)),
-            (one, other) => one.or(other),
+        let found = marks::of(&distances.unwrap_or_default(), tests).into_iter();
+        let mark = |(position, test): (usize, u8)| Mark {
+            test,
+            position: position + 1,
+            at: self.at[position],
+            value: self.sums.value(self.offsets[position]),
         };
-        let width = low.zip(high).map(|(low, high)| high.minus(low));
-        let over = |distance: Option<f64>, sigma: Option<f64>| defined(distance? / sigma?);
-        let root = |tail| (distribution::chi_squared_quantile(tail, df) / df).sqrt();
-        let both = |sigma| {
-            over(width, sigma)
-                .map(|six| six / 6.0)
-                .map(|value| Capability {
-                    value,
-                    from: value * root(Tail::Lower(0.025)),
-                    to: value * root(Tail::Upper(0.025)),
-                })
-        };
-        let one = |sigma| {
-            over(nearest, sigma).map(|three| three / 3.0).map(|value| {
-                let half = 1.96 * (1.0 / (9.0 * n as f64) + value * value / (2.0 * df)).sqrt();
-                Capability {
-                    value,
-                    from: value - half,
-                    to: value + half,
-                }
-            })
-        };
-        let first = self.first.to_f64();
-        let value = |offset: &f64| first + offset;
-        let mean = value(&spread.mean);
-        let scattering = sigma.filter(|sigma| *sigma > 0.0);
+        let values = self.offsets.iter().map(|offset| self.sums.value(*offset));
+        let ranges = self.offsets.windows(2);
         ProcessGroup {
-            low: low.map(Decimal::to_f64),
-            high: high.map(Decimal::to_f64),
-            first: self.at.first().copied().unwrap_or(0),
-            last: self.at.last().copied().unwrap_or(0),
-            n,
-            mean,
-            s,
-            mean_range,
-            sigma,
-            pp: both(s),
-            ppk: one(s),
-            cp: both(sigma),
-            cpk: one(sigma),
-            control: sigma.map(|sigma| [mean - 3.0 * sigma, mean + 3.0 * sigma]),
-            largest_range: mean_range.map(|range| LARGEST_RANGE * range),
-            prediction: Prediction::compared(&self.sigmas, &self.us, s, df, true),
-            marks: scattering.map_or(Vec::new(), |sigma| {
-                let distances: Vec<f64> = self
-                    .offsets
-                    .iter()
-                    .map(|x| (x - spread.mean) / sigma)
-                    .collect();
-                let found = marks::of(&distances, tests).into_iter();
-                let mark = |(position, test): (usize, u8)| Mark {
-                    test,
-                    position: position + 1,
-                    at: self.at[position],
-                    value: value(&self.offsets[position]),
-                };
-                found.map(mark).collect()
-            }),
-            individuals: self.offsets.iter().map(value).collect(),
-            moving_ranges: ranges,
+            marks: Some(found.map(mark).collect()),
+            individuals: Some(values.collect()),
+            moving_ranges: Some(ranges.map(|pair| (pair[1] - pair[0]).abs()).collect()),
+            ..self.sums.figures()
         }
     }
 }
@@ -375,7 +231,8 @@ impl Display for Process {
             if let Some(prediction) = &group.prediction {
                 writeln!(f, "    {}", compared(prediction, "s of the process"))?;
             }
-            for mark in group.marks.iter().take(MOST_PRINTED) {
+            let marks = group.marks.as_deref().unwrap_or_default();
+            for mark in marks.iter().take(MOST_PRINTED) {
                 writeln!(
                     f,
                     "    {}: {} {}",
@@ -384,11 +241,11 @@ impl Display for Process {
                     marks::words(mark.test)
                 )?;
             }
-            if group.marks.len() > MOST_PRINTED {
+            if marks.len() > MOST_PRINTED {
                 writeln!(
                     f,
                     "    and {} marks more; --json has all",
-                    group.marks.len() - MOST_PRINTED
+                    marks.len() - MOST_PRINTED
                 )?;
             }
         }

@@ -27,6 +27,7 @@ mod recipes;
 mod request;
 mod results;
 mod site;
+mod statistics;
 mod studies;
 mod tries;
 mod triggers;

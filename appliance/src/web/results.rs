@@ -141,7 +141,7 @@ fn write(to: &mut ToClient, serial: &str, mut walk: After, mut page: Page) -> io
     Ok(())
 }
 
-fn line(to: &mut ToClient, line: &impl Serialize) -> io::Result<()> {
+pub(super) fn line(to: &mut ToClient, line: &impl Serialize) -> io::Result<()> {
     serde_json::to_writer(&mut *to, line)?;
     to.write_all(b"\n")
 }

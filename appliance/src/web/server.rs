@@ -7,8 +7,8 @@ use super::site::Site;
 use super::slots::{Slot, Slots};
 use super::view::{self, Following};
 use super::{
-    assets, downloads, head, history, look, maps, metrics, orders, recipes, results, studies,
-    tries, triggers,
+    assets, downloads, head, history, look, maps, metrics, orders, recipes, results, statistics,
+    studies, tries, triggers,
 };
 use crate::system::clock;
 use axum::extract::Request;
@@ -110,6 +110,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}/maps.npz", maps::kept),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/results", results::after),
+        look("/api/statistics", statistics::statistics),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/kinds", recipes::kinds),
         look("/api/recipes", recipes::list),

@@ -110,6 +110,8 @@ pub struct Site {
     pub(super) files: Arc<Semaphore>,
     /// Permits to collect results.
     pub(super) collecting: Arc<Semaphore>,
+    /// A permit to work statistics out.
+    pub(super) reckoning: Arc<Semaphore>,
     /// The uptime at which a program asked for results last, s; 0 if none did.
     pub(super) collected_at_s: Arc<AtomicU32>,
     /// The maps of a kept part that were computed last; locked while something else is computed of
@@ -152,6 +154,7 @@ impl Site {
             arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
             collecting: Arc::new(Semaphore::new(MAX_COLLECTING)),
+            reckoning: Arc::new(Semaphore::new(1)),
             collected_at_s: Arc::default(),
             kept: Arc::default(),
             opened: Arc::default(),

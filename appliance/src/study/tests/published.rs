@@ -206,7 +206,7 @@ fn the_viscosity_of_a_primer_is_in_control() {
         3.267 * 0.480_714_285_714_285_7,
         1e-12,
     );
-    assert!(group.marks.is_empty());
+    assert!(group.marks.as_ref().unwrap().is_empty());
     let cp = group.cp.unwrap();
     close(cp.value, 3.0 / (6.0 * sigma), 1e-12);
     // χ² of 14 degrees of freedom: 5.6287 and 26.1189.

@@ -96,6 +96,6 @@ fn a_process_of_equal_values_or_one_has_no_index() {
             (group.pp, group.ppk, group.cp, group.cpk),
             (None, None, None, None)
         );
-        assert!(group.marks.is_empty() && !process.to_string().contains("NaN"));
+        assert!(group.marks.as_ref().unwrap().is_empty() && !process.to_string().contains("NaN"));
     }
 }
