@@ -136,7 +136,7 @@ fn a_value_in_the_guard_band_is_invalid_and_says_why_and_passes_without_a_guard_
     assert_eq!(close.gauges[0].decision.bits(), 0b10010);
     let reason = close.reason.unwrap();
     assert!(
-        reason.contains("too close to a limit to prove PASS or FAIL: deviation is"),
+        reason.contains("too near a limit to prove PASS or FAIL: deviation is"),
         "{reason}"
     );
     assert_eq!(

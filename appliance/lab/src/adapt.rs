@@ -212,7 +212,7 @@ impl AdaptReport {
         let sigmas = self.preliminary_sigma_mm.zip(self.predicted_sigma_mm);
         if let Some((before, after)) = sigmas {
             let text = format!("{after:.4} mm RMS, was {before:.4} mm with the same levels");
-            lines.push(("predicted error (1 σ)", text));
+            lines.push(("height noise (1 σ)", text));
         }
         let lines = lines
             .iter()

@@ -244,7 +244,7 @@ impl MeasurementReport {
             (None, None) => {}
         }
         if let Some(sigma) = self.sigma_mm {
-            line("predicted error (1 σ)", format!("{sigma:.4} mm RMS"));
+            line("height noise (1 σ)", format!("{sigma:.4} mm RMS"));
         }
         if let Some(uncertainty) = self.uncertainty_mm {
             line("uncertainty (k = 2)", format!("{uncertainty:.4} mm"));

@@ -81,7 +81,7 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -
             format!(", wrong fringe orders unseen at {part} of its pixels ({darkest} where it is darkest)")
         });
         format!(
-            "{} frames: predicted σ {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part{}: {word}",
+            "{} frames: height noise {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part{}: {word}",
             sequence.frames.len(),
             sequence.sigma_mm * 1000.0,
             allowed * 1000.0,
