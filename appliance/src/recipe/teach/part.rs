@@ -117,9 +117,9 @@ pub fn words(surroundings: &Surroundings) -> String {
         Some(step) => format!(
             "the part is {percent:.1} % of the frame and stands out from what it lies on by {step:.2} mm or more{others}"
         ),
-        None => format!(
-            "the part is {percent:.1} % of the frame, as it was marked or recorded{others}"
-        ),
+        None => {
+            format!("the part is {percent:.1} % of the frame, as it was marked or recorded{others}")
+        }
     }
 }
 
