@@ -14,6 +14,9 @@ export function decided({ decision }) {
   return { pass, valid, low, high, doubtful, absent };
 }
 
+// What U of a deviation, which is a mean over a square, leaves out.
+export const LEFT_OUT = "what that mean takes off a narrower dent is not in it";
+
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
 // "± –" if no σ is known. A deviation is a mean, which a dent narrower than its square changes by less than the dent's depth.
 export function uncertainty({ uncertainty: expanded, expected, unit, square }) {
@@ -21,7 +24,7 @@ export function uncertainty({ uncertainty: expanded, expected, unit, square }) {
   if (square) {
     const size = `${square.side} × ${square.side}`;
     lines.push(make("small", "", `mean of ${size} px`));
-    for (const line of lines) line.title = `U is of the mean over ${size} pixels: what that mean takes off a narrower dent is not in it`;
+    for (const line of lines) line.title = `U is of the mean over ${size} pixels: ${LEFT_OUT}`;
   }
   if (typeof expected === "number") lines.push(make("small", "", `good parts ${quantity(expected, unit, 1)}`));
   return lines;
