@@ -174,7 +174,7 @@ export async function part({ browser, program, step, folder }) {
       await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("the part is taken away"));
       await page.click("#step-empty button:has-text('Record the empty station')");
       await page.waitForSelector("#step-empty[data-state=done]");
-      assert.match(await page.textContent("#step-empty .said"), /of the picture shows something without a part/);
+      assert.match(await page.textContent("#step-empty .said"), /of the frame shows something without a part/);
       assert.equal(await lay("plate"), 200);
       await page.click("nav a[href='#recipes']");
       await teach(page, 7);

@@ -340,7 +340,10 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
     assert!(found.gauges[0].value.is_some() && found.gauges[1].value.is_none());
     assert_eq!(found.verdict(), Verdict::Invalid);
     let reason = found.reason.unwrap();
-    assert!(reason.contains("x, y, about z"), "{reason}");
+    assert!(
+        reason.contains("x, y, about z: leave the gauge out"),
+        "{reason}"
+    );
 }
 
 #[test]

@@ -107,6 +107,7 @@ fn are_named(parts: &[Part]) {
                 "{what}: {found:?}"
             );
             assert!(reason.contains(words), "{what}: {reason}");
+            assert!(reason.contains(": "), "{what} without a remedy: {reason}");
         }
     }
 }
@@ -133,6 +134,7 @@ fn another_part_a_part_out_of_place_and_none_are_told_apart() {
         assert_eq!(found.verdict(), Verdict::Invalid, "{found:?}");
         let reason = found.reason.as_deref().unwrap_or_default().to_owned();
         println!("{}: {reason}", found.error_code);
+        assert!(reason.contains(": "), "without a remedy: {reason}");
         (found.error_code, reason)
     };
     let placed = |shift_mm, rotation_deg| Placement {

@@ -102,4 +102,5 @@ mod two_clients;
 mod two_frames;
 mod weights;
 mod whole_maps;
+mod words;
 mod written;

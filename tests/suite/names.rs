@@ -5,7 +5,7 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::BTreeMap;
 
 /// The folders of the crates in which a name stands for one thing.
-const CRATES: [&str; 6] = [
+pub const CRATES: [&str; 6] = [
     "algo/src",
     "hal/src",
     "hal/sim/src",

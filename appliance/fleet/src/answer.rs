@@ -59,7 +59,7 @@ pub struct Row {
     pub exposure_us: u32,
     /// Exposure done → result, µs.
     pub processing_us: u32,
-    /// Share of the regions that is resolved.
+    /// Share of the surface compared with golden that is resolved.
     pub coverage: f64,
     /// x, y, z in mm and three turns in °; each null where the part does not determine it.
     pub placement: Option<[Option<f64>; 6]>,

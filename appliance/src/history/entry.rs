@@ -122,7 +122,7 @@ columns! {
         flags: u16 = record.flags(), "INTEGER NOT NULL";
         /// Resolved pixels.
         valid_points: u32 = record.inspection.valid_points, "INTEGER NOT NULL";
-        /// Share of the regions that is resolved, ‰.
+        /// Share of the surface compared with golden that is resolved, ‰.
         coverage_permille: u16 = record.inspection.coverage_permille, "INTEGER NOT NULL";
         /// Head temperature, °C.
         temperature_c: Option<f64> = finite(record.inspection.temperature_c), "REAL";

@@ -142,7 +142,7 @@ registers! {
         1 TRIGGER_TOKEN U16 x 1 = now.control.token, "a write of a value other than 0 and LAST_TOKEN triggers; echoed at 116 and 202";
         2 RECIPE_SELECT U16 x 1 = now.control.recipe_select, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
         3 PLC_HEARTBEAT U16 x 1 = now.control.plc_heartbeat, "any changing value; stale for longer than plc_timeout sets a warning bit";
-        4 PART_ID U32 x 1 = now.control.part_id, "the piece's serial, latched at the trigger, returned with the result";
+        4 PART_ID U32 x 1 = now.control.part_id, "number of the part, latched at the trigger, returned with the result";
         6 PRESS_STROKE U32 x 1 = now.control.press_stroke, "stroke or pallet counter, latched at the trigger, returned with the result";
         8 PART_NUMBER Ascii x 16 = &now.control.part_number[..], "recipe key, 32 characters";
     }
@@ -180,7 +180,7 @@ registers! {
         218 EXPOSURE_TIME U32 x 1 = record.exposure_us, "us, trigger to exposure done";
         220 TOTAL_TIME U32 x 1 = record.total_us, "us, trigger to result";
         222 VALID_POINTS U32 x 1 = record.inspection.valid_points, "resolved pixels";
-        224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the taught surface that is resolved, as min_coverage of the recipe; a gauge of the coverage is of its region";
+        224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the surface compared with golden that are resolved, as min_coverage of the recipe; a gauge of the coverage is of its region";
         225 TEMPERATURE I16 x 1 = tenths(record.inspection.temperature_c), "head, 0.1 degC, 0x8000 not known";
         226 HEIGHT_NOISE U16 x 1 = saturated_u16(record.inspection.height_noise_mm * 10_000.0), "0.1 um, 1 sigma, from the measured modulation";
         227 GAUGE_COUNT U16 x 1 = last_slot(record, 16), "0-16, the highest occupied of slots 1-16";

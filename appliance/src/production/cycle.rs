@@ -35,7 +35,7 @@ impl Worker {
         let Some(plan) = self.plan.clone() else {
             // Not reached: the station accepts triggers only with an active recipe, whose plan this
             // is.
-            let message = "measure: no recipe is loaded".into();
+            let message = "measure: no recipe is loaded: load or teach one".into();
             self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
         };
@@ -134,7 +134,7 @@ impl Worker {
         let head = &mut self.opened.head;
         match head.acquire_while(indices, DEVICE_TIMEOUT, &mut keep) {
             Ok(_) if frames.len() < indices.len() => {
-                let message = format!("measure: {ABORTED}");
+                let message = format!("measure: {ABORTED}: trigger again");
                 self.station
                     .event(failed(job, error_code::ABORTED, message));
                 None

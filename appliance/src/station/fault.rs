@@ -37,6 +37,11 @@ pub struct Fault {
 }
 
 impl Fault {
+    /// Cause and remedy in a sentence, for the result of a cycle that the fault ends.
+    pub(super) fn words(&self) -> Arc<str> {
+        format!("{}: {}", self.cause, self.remedy).into()
+    }
+
     /// A worker that was given `limit` for an order and did not answer.
     pub(super) fn deadline(waiting_for: &str, limit: Micros, since: Micros) -> Self {
         Self {

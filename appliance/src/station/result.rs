@@ -13,7 +13,7 @@ pub use algo::inspect::MAX_GAUGES;
 /// Pixels of a cycle that were not computed, and those that needed the slower exact solution.
 pub use algo::inspect::Skipped;
 
-/// The judgement of one cycle: register 208.
+/// The verdict of one cycle: register 208.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub enum Verdict {
@@ -76,7 +76,7 @@ pub mod flag {
         /// Measured while warming up.
         WARM_UP = 6, "measured while warming up";
         /// At least one decision is doubtful; the station sets it from the gauges.
-        DOUBTFUL = 7, "a decision is close to a limit";
+        DOUBTFUL = 7, "a decision is doubtful";
         /// The recipe has no limit that a part can miss: PASS says only that the part was measured.
         JUDGES_NOTHING = 8, "the recipe judges nothing: no gauge has a limit that a part can miss";
     }
@@ -143,7 +143,7 @@ pub struct Inspection {
     pub gauges: heapless::Vec<GaugeValue, MAX_GAUGES>,
     /// Resolved pixels.
     pub valid_points: u32,
-    /// Share of the regions that is resolved, ‰.
+    /// Share of the surface compared with golden that is resolved, ‰.
     pub coverage_permille: u16,
     /// Head temperature, °C.
     pub temperature_c: Option<f64>,

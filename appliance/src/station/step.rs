@@ -111,7 +111,7 @@ impl Station {
         let cycle = match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => Some(cycle),
             State::Stopping { cycle: Some(cycle) } => {
-                let words = "measure: the stop ended it before the measuring task answered";
+                let words = "measure: the stop ended it before the measuring task answered: trigger again after the start";
                 self.fail_cycle(cycle, error_code::ABORTED, words.into(), effects);
                 None
             }

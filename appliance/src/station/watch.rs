@@ -22,7 +22,7 @@ impl Station {
         alarm(&fault, effects);
         match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => {
-                self.fail_cycle(cycle, fault.code, fault.cause.clone(), effects);
+                self.fail_cycle(cycle, fault.code, fault.words(), effects);
             }
             State::Loading { .. } => self.recipes.interrupt(),
             // No other recipe was asked for: the one before may come back with the head.
@@ -30,7 +30,7 @@ impl Station {
             State::Stopping { cycle } => {
                 self.state = State::Stopping { cycle: None };
                 if let Some(cycle) = cycle {
-                    self.fail_cycle(cycle, fault.code, fault.cause, effects);
+                    self.fail_cycle(cycle, fault.code, fault.words(), effects);
                 }
                 return;
             }

@@ -246,7 +246,7 @@ pub(super) async fn cloud(
 
 /// The answer where the frames of the last result are needed and missing.
 pub(super) const GONE: &str =
-    "the frames of the last result are gone, or the station is busy; trigger a measurement";
+    "the frames of the last result are gone, or the station is busy; trigger a cycle";
 
 pub(super) async fn recording(site: Site) -> Answered<Response> {
     send(&site, "application/zip", |site| {
@@ -277,7 +277,7 @@ pub(super) async fn gauges(site: Site) -> Answered<Response> {
 
 fn gauges_csv(site: &Site) -> Answered<(String, Download)> {
     let snapshot = site.station.snapshot();
-    let words = "nothing was measured yet; trigger a measurement";
+    let words = "nothing was measured yet; trigger a cycle";
     let result = snapshot
         .result
         .as_deref()

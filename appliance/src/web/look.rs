@@ -110,7 +110,7 @@ pub(super) async fn features(site: Site) -> Answered<Response> {
 
 /// Not an error: the page asks for what belongs to every result.
 fn none() -> Response {
-    let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+    let words = "the frames are gone, or nothing was measured yet: trigger a cycle";
     (StatusCode::NO_CONTENT, [("x-none", words)]).into_response()
 }
 

@@ -222,7 +222,7 @@ impl Exposition {
         self.gauge(
             "fringed_coverage_ratio",
             share(found.coverage_permille),
-            "Share of the regions that the last cycle resolved.",
+            "Coverage of the last cycle: share of the surface compared with golden that is resolved.",
         );
         self.gauge(
             "fringed_pattern_fitness_ratio",

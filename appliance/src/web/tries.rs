@@ -232,7 +232,7 @@ fn parts(
 /// What it measures of the last part, and the verdict that this had.
 fn last(site: &Site, (open, tried): (&EditedRecipe, &Tried)) -> (Option<u32>, Answered<TriedPart>) {
     let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
-        let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+        let words = "the frames are gone, or nothing was measured yet: trigger a cycle";
         return (None, Err(Problem::missing(words)));
     };
     let measured = || {

@@ -263,7 +263,7 @@ fn empty(subject: &mut Subject<'_>) -> Result<Option<StepOutcome>> {
     stored.map_err(|error| failed(error.to_string()))?;
     let seen = 100.0 * empty.seen();
     let said = format!(
-        "{seen:.1} % of the picture shows something without a part: parts that are taught from now on are told from it"
+        "{seen:.1} % of the frame shows something without a part: parts that are taught from now on are told from it"
     );
     Ok(Some(StepOutcome::passed(
         [said],

@@ -23,7 +23,7 @@ pub(super) fn geometry(examination: &mut Examination<'_>) -> CheckResult {
     let fringes = CrossedFringes::take(examination.head, calibration, PATIENCE, &|_| ())?;
     let Some(seen) = fringes.compare(calibration)? else {
         return Ok(Check::skipped(
-            "cannot be judged: too little of the picture shows fringes; put a larger part into view",
+            "cannot be judged: too little of the frame shows fringes; put a larger part into view",
         ));
     };
     let found = format!(

@@ -53,7 +53,7 @@ pub fn lit_enough(lit: &Lit) -> Check {
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
     Check::new(
         format!(
-            "{:.1} % of the picture is lit by the projector",
+            "{:.1} % of the frame is lit by the projector",
             share * 100.0
         ),
         (share < LEAST_LIT).then_some(remedy),

@@ -232,7 +232,7 @@ impl Plan {
                 if sequence + 1 < self.runs.len() {
                     let unlike = likeness.is_some_and(|likeness| likeness < judge::ALIKE);
                     inspection.step_up = match unlike {
-                        true => Some("the picture differs from that of the taught part"),
+                        true => Some("the frames differ from those of the part that was taught"),
                         false => self.demands.step_up(&findings, &inspection),
                     };
                 }
@@ -244,7 +244,8 @@ impl Plan {
             }
             Err(reason) => {
                 inspection.judged = Verdict::Invalid;
-                inspection.reason = Some(reason.words.into());
+                let words = format!("{}: set the camera as it was, or teach again", reason.words);
+                inspection.reason = Some(words.into());
                 inspection.error_code = WRONG_FRAMES;
             }
         }

@@ -44,6 +44,11 @@ const NAMED: usize = 8;
 
 /// Why a gauge has no value.
 const NOTHING: &str = "found nothing to measure";
+/// What to do where a gauge has no value on a part.
+const UNCOVER: &str =
+    "clear what covers or darkens it, light it as when it was taught, and measure again";
+/// What to do where another part lies, or none.
+const PUT: &str = "put the part that was taught in place, or load the recipe of this one";
 
 impl Demands {
     /// What is known of a gauge without a value.
@@ -176,9 +181,7 @@ impl Demands {
             let words = self.unresolved(findings.coverage);
             return Some(Reason {
                 code: NOT_THE_PART,
-                words: format!(
-                    "{words}, in the light that it was taught in: is it the part that was taught, and in place?"
-                ),
+                words: format!("{words}, in the light that it was taught in: {PUT}"),
             });
         }
         let placed = findings.placed.as_ref();
@@ -188,35 +191,46 @@ impl Demands {
         if self.aligned && placed.is_none() {
             return Some(Reason {
                 code: NOT_THE_PART,
-                words: "too little of the part lies where it was taught to be aligned: is it the part that was taught, and in place?".into(),
+                words: format!(
+                    "too little of the part lies where it was taught to be aligned: {PUT}"
+                ),
             });
         }
-        let gauges = inspection.gauges.iter();
-        let missing: Vec<String> = gauges
-            .filter(|gauge| gauge.decision.unseen())
-            .map(|gauge| match gauge.reason.as_deref() {
-                None | Some(NOTHING) => gauge.name.to_string(),
-                Some(reason) => format!("{} ({reason})", gauge.name),
-            })
-            .collect();
-        if missing.is_empty() {
-            let words = self.undecided(inspection)?;
-            let code = GUARD_BAND;
-            return Some(Reason { code, words });
-        }
-        let left_out = match inspection
-            .placement
-            .as_ref()
-            .map(Placement::undetermined)
-            .as_deref()
-        {
-            None | Some([]) => String::new(),
-            Some(names) => format!("; the part's shape does not determine {}", names.join(", ")),
+        let undecided = |words| Reason {
+            code: GUARD_BAND,
+            words,
         };
-        let missing = missing.join(", ");
+        self.unmeasured(inspection, findings)
+            .or_else(|| self.undecided(inspection).map(undecided))
+    }
+
+    /// Which gauges have no value although nothing is absent, and what to do about the first one;
+    /// `None` if there is none.
+    fn unmeasured(&self, inspection: &Inspection, findings: &Findings) -> Option<Reason> {
+        let limits = self.limits.iter().zip(&findings.missing);
+        let gauges = limits.zip(&inspection.gauges);
+        let unseen = gauges.filter(|(_, gauge)| gauge.decision.unseen());
+        let ((limits, why), _) = unseen.clone().next()?;
+        let named = unseen.map(|(_, gauge)| match gauge.reason.as_deref() {
+            None | Some(NOTHING) => gauge.name.to_string(),
+            Some(reason) => format!("{} ({reason})", gauge.name),
+        });
+        let named = named.collect::<Vec<_>>().join(", ");
+        let open = inspection.placement.as_ref().map(Placement::undetermined);
+        let open = open.unwrap_or_default().join(", ");
+        let left_out = match open.is_empty() {
+            true => String::new(),
+            false => format!("; the part's shape does not determine {open}"),
+        };
+        let remedy = match why {
+            // Its reason says what to do.
+            Some(Missing::Open) => String::new(),
+            _ if limits.of.is_empty() && !open.is_empty() => ": leave the gauge out".into(),
+            _ => format!(": {UNCOVER}"),
+        };
         Some(Reason {
             code: NOT_MEASURED,
-            words: format!("gauge {missing} {NOTHING}{left_out}"),
+            words: format!("gauge {named} {NOTHING}{left_out}{remedy}"),
         })
     }
 
@@ -239,10 +253,10 @@ impl Demands {
         }
     }
 
-    /// How much of the surface is resolved, and how much is needed.
+    /// How large the coverage is, and how large it must be.
     fn unresolved(&self, coverage: f64) -> String {
         format!(
-            "only {:.1} % of the taught surface is resolved, {:.1} % are needed",
+            "the coverage is only {:.1} %, {:.1} % are needed",
             coverage * 100.0,
             self.min_coverage * 100.0
         )
@@ -271,7 +285,7 @@ impl Demands {
             true => Reason {
                 code: NOT_THE_PART,
                 words: format!(
-                    "this does not look like the part that was taught, which {lies} if it is there: put that part in place, or load the recipe of this one"
+                    "this does not look like the part that was taught, which {lies} if it is there: {PUT}"
                 ),
             },
             false => Reason {
@@ -353,13 +367,13 @@ impl Demands {
         if findings.contradicting > CONTRADICTING {
             Some("the levels contradict each other")
         } else if findings.coverage < self.min_coverage {
-            Some("too little of the surface is resolved")
+            Some("the coverage is too small")
         } else if fitness < UNFIT {
             Some("the pattern has lost its contrast")
         } else if placed.is_some_and(|placed| self.is_off(placed)) {
             Some("the part lies outside of what the sequence is safe for")
         } else if placed.is_some_and(|placed| placed.outliers > OUTLIERS) {
-            Some("many points lie off the taught surface")
+            Some("many points lie off golden")
         } else if inspection.guarded().next().is_some() {
             Some("a value lies too close to a limit")
         } else if findings.skipped.unexpected > 0 && inspection.gauges.iter().any(is_low_share) {

@@ -86,7 +86,7 @@ impl Cause {
     pub fn words(self) -> String {
         match self {
             Self::Nothing => {
-                "none of the pattern's light comes back: is the part in place and the light on?"
+                "none of the pattern's light comes back: put the part in place, and switch the light on"
                     .into()
             }
             Self::Dark(share) => format!(

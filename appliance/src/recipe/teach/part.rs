@@ -110,16 +110,16 @@ pub fn words(surroundings: &Surroundings) -> String {
     let share = |of: &[bool]| of.iter().filter(|is| **is).count() as f64 / of.len().max(1) as f64;
     let others = match share(others) * 100.0 {
         percent if percent < 0.05 => String::new(),
-        percent => format!("; other things on {percent:.1} % of the picture are left out"),
+        percent => format!("; other things on {percent:.1} % of the frame are left out"),
     };
     let percent = share(part) * 100.0;
     match step_mm {
         Some(step) => format!(
-            "the part is {percent:.1} % of the picture and stands out from what it lies on by {step:.2} mm or more{others}"
+            "the part is {percent:.1} % of the frame and stands out from what it lies on by {step:.2} mm or more{others}"
         ),
-        None => format!(
-            "the part is {percent:.1} % of the picture, as it was marked or recorded{others}"
-        ),
+        None => {
+            format!("the part is {percent:.1} % of the frame, as it was marked or recorded{others}")
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 // The error that an answer reports.
 async function failure(response) {
   const content = await response.json().catch(() => null);
-  const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
+  const error = new Error(content && content.error ? content.error : `the device answers ${response.status}`);
   error.status = response.status;
   error.taken = content && content.taken;
   error.why = content && content.why;
@@ -18,7 +18,7 @@ export async function ask(method, path, body) {
     options.headers["Content-Type"] = "application/json";
   }
   let response;
-  try { response = await fetch(path, options); } catch (gone) { throw new Error("the sensor does not answer; check the network"); }
+  try { response = await fetch(path, options); } catch (gone) { throw new Error("the device does not answer; check the network"); }
   if (!response.ok) throw await failure(response);
   return response.json().catch(() => null);
 }

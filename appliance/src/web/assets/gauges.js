@@ -3,7 +3,7 @@ import { $, fill, make, show, text } from "./element.js";
 import { limits, quantity } from "./number.js";
 import { ask } from "./api.js";
 import { trend } from "./trend.js";
-import { decided, named, tag, uncertainty } from "./verdict.js";
+import { decided, doubtful, named, tag, uncertainty } from "./verdict.js";
 
 // Values of a trend.
 const KEPT = 100;
@@ -39,7 +39,7 @@ function row(gauge) {
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
   const verdict = make("td", "", tag(gauge));
-  verdict.append(gauge.doubtful ? make("small", "", "close to a limit") : make("small", "room", "\u00a0"));
+  verdict.append(gauge.doubtful ? doubtful() : make("small", "room", "\u00a0"));
   return make("tr", "", named(gauge), value, range, make("td", "trend-cell", trend(points, gauge)), verdict);
 }
 

@@ -7,7 +7,7 @@ import { about, changes, limits, measures, milliseconds, moment, quantity, signe
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
-import { decided, named, tag, uncertainty } from "./verdict.js";
+import { decided, doubtful, named, tag, uncertainty } from "./verdict.js";
 import { viewOf } from "./view.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
@@ -19,7 +19,7 @@ let view = null, points = 0;
 function gauge(entry) {
   const decision = decided(entry);
   const verdict = make("td", "", tag(decision));
-  if (decision.doubtful) verdict.append(make("small", "", "close to a limit"));
+  if (decision.doubtful) verdict.append(doubtful());
   const value = make("td", "nowrap", entry.value === null ? entry.reason || "not measured" : quantity(entry.value, entry.unit));
   if (entry.value !== null) value.append(...uncertainty(entry));
   return make("tr", "", named(entry), value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);
@@ -43,7 +43,7 @@ function facts({ result, flags }, boot) {
     ["Token", result.token ? String(result.token) : "none"],
     ["Trigger to result", milliseconds(result.total_us)],
     ["Points", points],
-    ["Regions resolved", coverage],
+    ["Coverage", coverage],
     ["Height noise (1 σ)", noise],
     ["Pattern fitness", fitness],
     ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(" · ") || "–"],

@@ -36,7 +36,7 @@ function check() {
   const silent = at - state.event > STALE_MS;
   const still = at - state.beatAt > STALE_MS;
   const seconds = (since) => (since === -Infinity ? "" : ` for ${Math.floor((at - since) / 1000)} s`);
-  if (silent) cover(true, `no word from the sensor${seconds(state.event)}`);
+  if (silent) cover(true, `no word from the device${seconds(state.event)}`);
   else if (still) cover(true, `the measuring task's heartbeat stands still${seconds(state.beatAt)}`);
   else cover(false, "");
   // The browser reconnects by itself unless the server refused it.

@@ -5,7 +5,7 @@ import { clock, quantity } from "./number.js";
 const SENTENCES = {
   PASS: "every gauge is within its limits",
   FAIL: "a gauge is outside its limits",
-  INVALID: "not everything could be measured or decided",
+  INVALID: "not everything could be measured or decided: see the gauges, and measure the part again",
 };
 
 // The decision about a stored gauge by its bits, which are those of the register GAUGE_DECISION.
@@ -14,13 +14,27 @@ export function decided({ decision }) {
   return { pass, valid, low, high, doubtful, absent };
 }
 
+// What U of a deviation, which is a mean over a square, leaves out.
+export const LEFT_OUT = "what that mean takes off a narrower dent is not in it";
+
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
-// "± –" if no σ is known.
-export function uncertainty({ uncertainty: expanded, expected, unit }) {
-  const words = [];
-  words.push(typeof expanded === "number" ? `± ${quantity(expanded, unit, 1)}` : "± –");
-  if (typeof expected === "number") words.push(`good parts ${quantity(expected, unit, 1)}`);
-  return words.map((line) => make("small", "", line));
+// "± –" if no σ is known. A deviation is a mean, which a dent narrower than its square changes by less than the dent's depth.
+export function uncertainty({ uncertainty: expanded, expected, unit, square }) {
+  const lines = [make("small", "", typeof expanded === "number" ? `± ${quantity(expanded, unit, 1)}` : "± –")];
+  if (square) {
+    const size = `${square.side} × ${square.side}`;
+    lines.push(make("small", "", `mean of ${size} px`));
+    for (const line of lines) line.title = `U is of the mean over ${size} pixels: ${LEFT_OUT}`;
+  }
+  if (typeof expected === "number") lines.push(make("small", "", `good parts ${quantity(expected, unit, 1)}`));
+  return lines;
+}
+
+// Says that a gauge's decision is doubtful.
+export function doubtful() {
+  const made = make("small", "", "doubtful");
+  made.title = "a limit lies within 2 σ of the value, or the value in the guard band";
+  return made;
 }
 
 // The tag that shows the decision about a gauge.
@@ -56,7 +70,7 @@ function partWords(result) {
   const words = [`no. ${result.seq}`, `part ${result.part_id}`];
   if (result.press_stroke) words.push(`stroke ${result.press_stroke}`);
   if (result.time_utc_us) words.push(clock(result.time_utc_us));
-  if (result.doubtful) words.push("close to a limit");
+  if (result.doubtful) words.push("doubtful");
   if (result.simulated) words.push("simulated head");
   return words.join(" · ");
 }
