@@ -267,11 +267,10 @@ impl Reader {
             let walk = Walk {
                 connection: &connection,
                 asked,
-                rest,
                 all,
             };
             let mut gauges: Vec<GaugeSums> = Vec::new();
-            let summed = walk.pass(0.0, &mut tell, |row| {
+            let summed = walk.pass((0.0, Rest(0)), &mut tell, |row| {
                 let gauge = gauge_of(&mut gauges, row, invalid, asked.columns);
                 if row.verdict == Verdict::Invalid {
                 } else if of_studies.contains(&row.seq) {
@@ -285,7 +284,8 @@ impl Reader {
             }
             gauges.iter_mut().for_each(GaugeSums::begin_histogram);
             let mut next = 0;
-            let looked = walk.pass(0.5, &mut tell, |row| {
+            // The figures are shown: what follows has time.
+            let looked = walk.pass((0.5, rest), &mut tell, |row| {
                 if versions.get(next) == Some(&row.seq) {
                     next += 1;
                     // What was usual before is not any more.
@@ -313,23 +313,22 @@ impl Reader {
 struct Walk<'a> {
     connection: &'a Connection,
     asked: &'a StatisticsRequest,
-    rest: Rest,
     /// Results on the way.
     all: u64,
 }
 
 impl Walk<'_> {
-    /// Takes each value, and tells how far it is from `done` on; answers whether it came to the end.
+    /// Takes each value, resting so much, and tells how far it is from `done` on; answers whether it came to the end.
     fn pass(
         &self,
-        done: f64,
+        (done, rest): (f64, Rest),
         tell: &mut impl FnMut(StatisticsPart) -> bool,
         mut take: impl FnMut(&ValueRow<'_>),
     ) -> rusqlite::Result<bool> {
         let (mut told, mut results, mut seq, mut goes_on) = (Instant::now(), 0, None, true);
         let asked = self.asked;
         let of = (&asked.filter, asked.slot, asked.axis.expression());
-        each_value(self.connection, of, self.rest, |row| {
+        each_value(self.connection, of, rest, |row| {
             if seq != Some(row.seq) {
                 (seq, results) = (Some(row.seq), results + 1);
                 if told.elapsed() > PERIOD {

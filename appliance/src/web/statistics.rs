@@ -25,8 +25,10 @@ use tokio::sync::oneshot;
 /// Columns of a chart, unless asked for another number.
 const COLUMNS: usize = 120;
 const MOST_COLUMNS: usize = 1000;
-/// A rest is so many times as long as the work before.
+/// While parts are measured, a rest is as long as the work before.
 const REST: Rest = Rest(1);
+/// A station that has measured nothing for so long, s, has no cycle that could be late.
+const QUIET_S: u32 = 10;
 /// Longest wait for the statistics of others.
 const TURN: Duration = Duration::from_secs(30);
 
@@ -127,9 +129,13 @@ pub(super) async fn statistics(
         let _turn = turn;
         computing::stand_back();
         let mut begun = Some(begun);
+        let now = site.station.snapshot();
+        let last = now.result.as_ref().map_or(0, |result| result.uptime_s);
+        let is_quiet = !now.is_working() && now.uptime_s.saturating_sub(last) > QUIET_S;
+        let rest = if is_quiet { Rest(0) } else { REST };
         let worked = site.history.id().and_then(|id| {
             let of_studies = site.studies.seqs(&id);
-            site.history.statistics(&asked, &of_studies, REST, |part| {
+            site.history.statistics(&asked, &of_studies, rest, |part| {
                 if let StatisticsPart::Results(_) = part
                     && begun.take().is_none_or(|begun| begun.send(Ok(())).is_err())
                 {

@@ -105,7 +105,7 @@ async fn once(site: Site, trigger: Trigger, token: Arc<str>) -> Answered<Value> 
         return Err(rejected(&after, &trigger));
     }
     let ended = snapshots.wait_for(|now| !is_mine(now)).await;
-    ended.map_err(|_| Problem::broken("fringed ends: repeat the request"))?;
+    ended.map_err(|_| Problem::crowded("fringed ends: repeat the request"))?;
     let lost = "the result is not in the history: look at the page for it";
     let measured = stored(&site, &token).await?;
     measured.ok_or_else(|| Problem::broken(lost))
