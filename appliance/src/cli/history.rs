@@ -65,6 +65,7 @@ impl HistoryOptions {
             until_us: self.until,
             before_seq: None,
             limit: self.limit.unwrap_or(usual) as usize,
+            ..Filter::default()
         };
         let undated = warn_of_undated(&reader, &filter)?;
         if self.csv {

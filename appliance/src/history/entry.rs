@@ -258,6 +258,14 @@ pub struct Filter {
     pub since_us: Option<u64>,
     /// Results that were triggered before this time, µs since 1970 UTC.
     pub until_us: Option<u64>,
+    /// Results of this PRESS_STROKE or a later one.
+    pub from_stroke: Option<u32>,
+    /// Results of this PRESS_STROKE or an earlier one.
+    pub to_stroke: Option<u32>,
+    /// Results of this SEQ or a later one.
+    pub from_seq: Option<u32>,
+    /// Results of this SEQ or an earlier one.
+    pub to_seq: Option<u32>,
     /// Results that were stored before the result of this SEQ: the next page of a list.
     pub before_seq: Option<u32>,
     /// At most this many results, the newest.
@@ -272,6 +280,10 @@ impl Default for Filter {
             part_id: None,
             since_us: None,
             until_us: None,
+            from_stroke: None,
+            to_stroke: None,
+            from_seq: None,
+            to_seq: None,
             before_seq: None,
             limit: 100,
         }

@@ -356,6 +356,10 @@ pub(super) fn condition(filter: &Filter) -> (String, Vec<Value>) {
         "coalesce(time_utc_us, browser_utc_us) < ?",
         time(filter.until_us),
     );
+    add("press_stroke >= ?", filter.from_stroke.map(i64::from));
+    add("press_stroke <= ?", filter.to_stroke.map(i64::from));
+    add("seq >= ?", filter.from_seq.map(i64::from));
+    add("seq <= ?", filter.to_seq.map(i64::from));
     let before = "id < (SELECT min(id) FROM result WHERE seq = ?)";
     add(before, filter.before_seq.map(i64::from));
     (conditions.join(" AND "), values)

@@ -56,6 +56,10 @@ pub(super) struct ResultsQuery {
     part_id: Option<u32>,
     since_us: Option<u64>,
     until_us: Option<u64>,
+    from_stroke: Option<u32>,
+    to_stroke: Option<u32>,
+    from_seq: Option<u32>,
+    to_seq: Option<u32>,
     before_seq: Option<u32>,
     limit: Option<usize>,
 }
@@ -75,6 +79,10 @@ impl ResultsQuery {
             part_id: self.part_id,
             since_us: self.since_us,
             until_us: self.until_us,
+            from_stroke: self.from_stroke,
+            to_stroke: self.to_stroke,
+            from_seq: self.from_seq,
+            to_seq: self.to_seq,
             before_seq: self.before_seq,
             limit: self.limit.unwrap_or(usual).min(most),
         })

@@ -35,6 +35,21 @@ export function unitOf(table, gauge) {
   return table.units.find((one) => one.unit === own);
 }
 
+// Hands each line of JSON of an answer to `take` as it comes, until that answers false.
+export async function lines(path, take) {
+  const response = await fetch(path, { credentials: "same-origin" }).catch(() => { throw new Error("the device does not answer; check the network"); });
+  if (!response.ok) throw await failure(response);
+  const reader = response.body.getReader(), decoder = new TextDecoder();
+  let rest = "";
+  for (;;) {
+    const { done, value } = await reader.read().catch(() => { throw new Error("the answer broke off: try again"); });
+    if (done) return;
+    const all = (rest + decoder.decode(value, { stream: true })).split("\n");
+    rest = all.pop();
+    if (!all.every((line) => take(JSON.parse(line)) !== false)) { reader.cancel(); return; }
+  }
+}
+
 // A picture, to be drawn on a canvas.
 export async function picture(path) {
   const response = await fetch(path, { credentials: "same-origin", cache: "no-store" });

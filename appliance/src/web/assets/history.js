@@ -9,6 +9,8 @@ const PAGE = 50;
 let oldest = null;
 let boot = "";
 let seen = false;
+// What a chart has chosen, in place of dates.
+let chosen = null;
 
 // The beginning of the chosen day in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
 function day(id, more) {
@@ -20,6 +22,10 @@ function filter() {
   const wanted = new URLSearchParams();
   for (const [id, key] of [["filter-recipe", "recipe"], ["filter-verdict", "verdict"], ["filter-part", "part_id"]]) {
     if ($(id).value !== "") wanted.set(key, $(id).value);
+  }
+  if (chosen) {
+    for (const key of Object.keys(chosen.keys)) wanted.set(key, chosen.keys[key]);
+    return wanted;
   }
   if ($("filter-from").value) wanted.set("since_us", day("filter-from", 0));
   if ($("filter-to").value) wanted.set("until_us", day("filter-to", 1));
@@ -74,6 +80,24 @@ async function load(more) {
   }
 }
 
+// Lists the results of a recipe that a chart has chosen, in words and as keys of a query.
+export function listRange(recipe, keys, words) {
+  chosen = { keys, words };
+  for (const id of ["filter-verdict", "filter-part", "filter-from", "filter-to"]) $(id).value = "";
+  $("filter-recipe").value = recipe;
+  range();
+  load(false);
+  $("history-title").scrollIntoView({ block: "start" });
+  $("history-csv").focus({ preventScroll: true });
+}
+
+function range() {
+  show("filter-range", Boolean(chosen));
+  text("filter-range-words", chosen ? `from the chart: ${chosen.words}` : "");
+}
+
+export function showResult(seq) { return openKept(seq, boot); }
+
 export function openHistory(visible, now) {
   boot = now.boot_id;
   seen = visible;
@@ -82,6 +106,7 @@ export function openHistory(visible, now) {
 
 export function start() {
   $("filter").addEventListener("submit", (event) => { event.preventDefault(); load(false); });
+  $("filter-range-drop").addEventListener("click", () => { chosen = null; range(); load(false); });
   $("history-more").addEventListener("click", () => load(true));
   window.addEventListener("dated", () => { if (seen) load(false); });
 }

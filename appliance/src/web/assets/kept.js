@@ -11,7 +11,7 @@ import { decided, doubtful, named, tag, uncertainty } from "./verdict.js";
 import { viewOf } from "./view.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
-const state = { seq: 0, layer: "height", asked: 0, failed: [], found: null };
+const state = { seq: 0, layer: "height", asked: 0, failed: [], found: null, result: null };
 
 // The view in 3-D, and the number of points of the part.
 let view = null, points = 0;
@@ -99,6 +99,7 @@ export async function openKept(seq, boot) {
   }
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
+  state.result = result;
   state.failed = result.gauges.filter((one) => one.square && !decided(one).pass).map((one) => one.square);
   points = result.valid_points;
   text("kept-number", `no. ${seq}`);
@@ -115,6 +116,9 @@ export async function openKept(seq, boot) {
   $("kept").scrollIntoView({ block: "start" });
   if (!no_frames) picture();
 }
+
+// The result that is shown.
+export function kept() { return state.result; }
 
 export function start() {
   view = viewOf($("kept-map"));

@@ -10,6 +10,8 @@ import { start as startEditor } from "./editor.js";
 import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
 import { openHistory, start as startHistory } from "./history.js";
+import { openStatistics, start as startStatistics } from "./statistics.js";
+import { start as startReport } from "./report.js";
 import { openStudies, start as startStudies } from "./studies.js";
 import { openHead, start as startHead } from "./head.js";
 import { start as startKept } from "./kept.js";
@@ -69,7 +71,7 @@ function showSnapshot(now) {
   showSimulation(now);
   // Times that were recorded without a synchronised clock are relative to the start of the program, so the lists are read again when
   // BOOT_ID is known or has changed.
-  if (restarted) { openHistory(view === "history", now); openStudies(view === "history", now); openDevice(view === "device", now); }
+  if (restarted) { openHistory(view === "history", now); openStatistics(view === "history", now); openStudies(view === "history", now); openDevice(view === "device", now); }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {
     shown = key;
@@ -97,6 +99,7 @@ function openView() {
   openHead(view === "head");
   if (last) {
     openHistory(view === "history", last);
+    openStatistics(view === "history", last);
     openStudies(view === "history", last);
     openDevice(view === "device", last);
     showPicture(last.result, view === "live");
@@ -113,6 +116,8 @@ startRegisters();
 startSimulation();
 startHistory();
 startKept();
+startStatistics();
+startReport(() => last);
 startStudies();
 startHead();
 $("trigger").addEventListener("click", () => change(() => ask("POST", "api/trigger")));

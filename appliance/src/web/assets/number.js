@@ -74,6 +74,13 @@ export function about(entry) {
   return !entry.utc_us && !entry.time_utc_us && entry.browser_utc_us ? "time from the browser of a signed-in user: the clock was not synchronised" : "";
 }
 
+// A moment in this device's time zone, to the minute.
+export function date(us) {
+  const two = (number) => String(number).padStart(2, "0");
+  const at = new Date(us / 1000);
+  return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${two(at.getHours())}:${two(at.getMinutes())}`;
+}
+
 // When something happened. If the clock was not synchronised: by the clock of a browser, else the time since that start of the device.
 export function moment(entry, boot) {
   const utc_us = entry.utc_us || entry.time_utc_us || entry.browser_utc_us;

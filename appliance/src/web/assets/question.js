@@ -16,7 +16,7 @@ function close(value) {
 function keys(event) {
   if (event.key === "Escape") { event.preventDefault(); close(null); }
   if (event.key !== "Tab") return;
-  const choices = Array.from($("question-choices").children);
+  const choices = Array.from($("question").querySelectorAll("input, button")).filter((one) => one.offsetParent);
   const at = choices.indexOf(document.activeElement), by = event.shiftKey ? -1 : 1;
   event.preventDefault();
   choices[(at + by + choices.length) % choices.length].focus();
@@ -32,9 +32,24 @@ export function choose(title, words, choices) {
     const offered = choices.map(([label, value]) => button(label, "strong", () => close(value)));
     const cancel = button("Cancel", "", () => close(null));
     fill($("question-choices"), ...offered, cancel);
+    show("question-field", false);
     show("question", true);
     cancel.focus();
   });
 }
 
-export function start() { $("question").addEventListener("keydown", keys); }
+// Asks for a text, which has a label; answers with it, null for Cancel.
+export async function enter(title, words, label, value, action) {
+  const field = $("question-text");
+  const answered = choose(title, words, [[action, action]]);
+  text("question-label", label);
+  field.value = value;
+  show("question-field", true);
+  field.select();
+  return (await answered) === null ? null : field.value.trim();
+}
+
+export function start() {
+  $("question-text").addEventListener("keydown", (event) => { if (event.key === "Enter") $("question-choices").firstChild.click(); });
+  $("question").addEventListener("keydown", keys);
+}

@@ -144,6 +144,9 @@ async function report(number) {
   } catch (error) { fill($("study-report"), make("p", "bad", error.message)); }
 }
 
+// The study that is open, for a report.
+export function asked() { return { ...open.asked, number: open.number }; }
+
 async function refresh() {
   if (!open) return;
   try { showStudy(await ask("GET", path(open.number))); } catch (error) { text("study-note", error.message); }

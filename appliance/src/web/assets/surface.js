@@ -71,7 +71,7 @@ function program(gl, vertex, fragment) {
 
 // What draws on a canvas while its context lives; null without WebGL 2.
 export function surface(canvas, antialias) {
-  const gl = canvas.getContext("webgl2", { antialias });
+  const gl = canvas.getContext("webgl2", { antialias, preserveDrawingBuffer: true });
   if (!gl) return null;
   const ground = program(gl, GROUND, SHADE), pieces = program(gl, STRIP, INK);
   const [words, corners, lines] = [1, 2, 3].map(() => gl.createBuffer());
