@@ -9,6 +9,7 @@ import { forms } from "./forms.js";
 import { part } from "./part.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
+import { statistics } from "./statistics.js";
 import { studies } from "./studies.js";
 import { view } from "./view.js";
 import { wizard } from "./wizard.js";
@@ -432,6 +433,7 @@ try {
   assert.deepEqual(complaints, [], "the browser complains");
   await editor({ browser, program, step, folder });
   await part({ browser, program, step, folder });
+  await statistics({ browser, program, step, folder });
   await studies({ browser, program, step, folder, full: process.argv.includes("full") });
   await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));

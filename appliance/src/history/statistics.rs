@@ -57,7 +57,7 @@ pub struct StatisticsRequest {
     pub slot: Option<u16>,
     /// What charts run over.
     pub axis: Axis,
-    /// Columns of a chart.
+    /// Columns of a chart, at most: it has no more than its axis has places.
     pub columns: usize,
 }
 
@@ -271,7 +271,7 @@ impl Reader {
             };
             let mut gauges: Vec<GaugeSums> = Vec::new();
             let summed = walk.pass((0.0, Rest(0)), &mut tell, |row| {
-                let gauge = gauge_of(&mut gauges, row, invalid, asked.columns);
+                let gauge = gauge_of(&mut gauges, row, invalid, scale.columns);
                 if row.verdict == Verdict::Invalid {
                 } else if of_studies.contains(&row.seq) {
                     gauge.left_out.of_studies += 1;
@@ -292,7 +292,7 @@ impl Reader {
                     gauges.iter_mut().for_each(GaugeSums::begin_anew);
                 }
                 if row.verdict != Verdict::Invalid && !of_studies.contains(&row.seq) {
-                    let gauge = gauge_of(&mut gauges, row, 0, asked.columns);
+                    let gauge = gauge_of(&mut gauges, row, 0, scale.columns);
                     gauge.look(row, &scale);
                 }
             })?;
@@ -367,16 +367,17 @@ fn results(
     let span = from
         .zip(to)
         .map_or(1, |(from, to)| (to - from).saturating_add(1));
+    let columns = asked.columns.min(usize::try_from(span).unwrap_or(1)).max(1);
     let scale = Scale {
         from: from.unwrap_or(0),
-        width: span as f64 / asked.columns as f64,
-        columns: asked.columns,
+        width: span as f64 / columns as f64,
+        columns,
     };
     let mut found = ResultStatistics {
         axis: asked.axis,
         from,
         to,
-        columns: vec![[0; 3]; asked.columns],
+        columns: vec![[0; 3]; columns],
         ..ResultStatistics::default()
     };
     let invalid = Verdict::Invalid.number();

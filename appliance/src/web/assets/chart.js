@@ -61,14 +61,18 @@ export function runChart(svg, width, results, gauge, marks) {
     pen = "L";
   });
   parts.push(put("path", "mean", { d: path }), ...rest);
-  for (const mark of marks ? marks.columns : []) if (mark.x !== null) parts.push(put("circle", "marked", { cx: x(mark.x).toFixed(1), cy: y(mark.value).toFixed(1), r: 3.4 }));
+  // Rings that would cover each other are left out; those beyond 3 σ come first.
+  const rings = marks ? marks.columns.filter((mark) => mark.x !== null).sort((a, b) => a.test - b.test) : [];
+  const taken = new Set();
+  const isFree = ({ x: at, test }) => { const cell = Math.round(x(at) / 8); if (taken.has(cell) || (test > 1 && taken.has(cell - 1))) return false; taken.add(cell); return true; };
+  for (const mark of rings.filter(isFree)) parts.push(put("circle", "marked", { cx: x(mark.x).toFixed(1), cy: y(mark.value).toFixed(1), r: 3.4 }));
   const drift = marks && marks.drift;
   if (drift && drift.x !== null) parts.push(line("drift", x(drift.x), x(drift.x), TOP, HEIGHT - BOTTOM), draw("text", { x: x(drift.x) + 4, y: HEIGHT - BOTTOM - 6 }, "drifts from here"));
   const tick = round((high - low) / 5);
   for (let at = Math.ceil(low / tick); at * tick <= high; at += 1) {
     parts.push(line("tick", LEFT - 4, LEFT, y(at * tick), y(at * tick)), draw("text", { x: LEFT - 8, y: y(at * tick) + 4, "text-anchor": "end" }, quantity(at * tick, gauge.unit)));
   }
-  const many = Math.max(2, Math.floor(inner / 150));
+  const many = Math.max(1, Math.floor(inner / 190));
   for (let at = 0; at <= many; at += 1) {
     const value = Math.round(from + (to - from) * at / many);
     const anchor = at === 0 ? "start" : at === many ? "end" : "middle";

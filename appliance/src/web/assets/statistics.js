@@ -58,7 +58,7 @@ function row({ gauge, marks }) {
   const cpk = make("td", "nowrap", figure(last.cpk), make("small", "", interval(last.cpk)));
   const mean = make("td", "nowrap", quantity(last.mean, gauge.unit, 1));
   const n = make("td", "", count(last.n));
-  if (gauge.groups.length > 1) n.append(make("small", "", `since its limits changed last, of ${gauge.groups.length} groups`));
+  if (gauge.groups.length > 1) n.append(make("small", "", `last of ${gauge.groups.length} groups`));
   const drifted = marks && marks.drift;
   return make("tr", "", heading, make("td", "trend-cell", chart), n, mean, make("td", "nowrap", last.s === null ? "–" : quantity(last.s, gauge.unit, 1)), cpk,
     marks && marks.first ? opened(marks.first, `first of ${count(marks.marks)}`) : make("td", "", marks ? "none" : "…"),
@@ -116,6 +116,15 @@ async function load() {
       if (part.part !== "results") { state.gauges = found; rows(); }
     });
     if (!all) return;
+    const { counts: { pass, fail, invalid }, undated, off_axis } = state.results;
+    const dated = pass + fail + invalid - off_axis;
+    if (!dated && (undated || off_axis) && $("statistics-axis").value === "time") {
+      // A device whose clock was never synchronised knows the order of its results.
+      $("statistics-period").value = "all";
+      $("statistics-axis").value = "result";
+      await load();
+      return;
+    }
     state.gauges = found;
     rows();
     if (state.slot !== null) await detail();
