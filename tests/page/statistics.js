@@ -76,7 +76,7 @@ export async function statistics({ browser, program, step, folder }) {
       shown = await on.evaluate(() => [...document.querySelectorAll("main section, main form, main figure, header, footer, nav")].filter((one) => one.id && one.offsetParent).map((one) => one.id));
       const head = await on.textContent("#report-head");
       for (const words of ["serial", "fingerprint", "Calibration", "Program", "by Ann Other"]) assert.ok(head.includes(words), `${kind}: ${words} is missing in ${head}`);
-      await on.emulateMedia({ media: "screen" });
+      await on.emulateMedia({ media: null });
       // The browser ends the report when it has printed.
       const file = await on.pdf({ format, ...(folder ? { path: join(folder, `report-${kind}-${format}.pdf`) } : {}) });
       assert.ok(file.length > 9000 && file.toString("latin1").includes("/Type /Page"), `${kind}: ${file.length} bytes`);

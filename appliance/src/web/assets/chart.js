@@ -55,7 +55,8 @@ export function runChart(svg, width, results, gauge, marks) {
   for (const version of results.versions) if (version.x !== null) rest.push(line("version", x(version.x), x(version.x), TOP, HEIGHT - BOTTOM));
   let path = "", pen = "M";
   gauge.columns.forEach((column, at) => {
-    if (!column) { pen = "M"; return; }
+    if (!column) return;
+    if (column.least === column.most) parts.push(put("circle", "single", { cx: middle(at).toFixed(1), cy: y(column.mean).toFixed(1), r: 1.8 }));
     parts.push(line("span", middle(at), middle(at), y(column.least), Math.max(y(column.most), y(column.least) - HEIGHT)));
     path += `${pen}${middle(at).toFixed(1)} ${y(column.mean).toFixed(1)}`;
     pen = "L";
