@@ -141,7 +141,7 @@ fn sums_of_squares_are_those_of_exact_arithmetic() {
 }
 
 /// So many results of recipe 1 with so many gauges, some of them INVALID or not measured, in the history of a place.
-fn stored(place: &Place, results: u32, gauges: u16) {
+pub(crate) fn stored(place: &Place, results: u32, gauges: u16) {
     let state = place.path("state");
     fs::create_dir_all(&state).unwrap();
     let (mut writer, _) = Writer::open(&state.join("history.db"), 10_000_000).unwrap();

@@ -47,9 +47,9 @@ pub(super) fn each_value(
     );
     let mut statement = connection.prepare(&query)?;
     let mut rows = statement.query(params_from_iter(values))?;
-    let mut pace = Pace::of(rest);
+    let mut rests = Rests::of(rest);
     while let Some(row) = rows.next()? {
-        pace.step();
+        rests.step();
         let is_valid = row.get::<_, u16>(7)? & decision::VALID != 0;
         let going_on = take(ValueRow {
             seq: row.get(0)?,
@@ -144,13 +144,13 @@ const SLICE: u32 = 4096;
 const LONGEST: Duration = Duration::from_millis(20);
 
 /// When to rest.
-pub(super) struct Pace {
+pub(super) struct Rests {
     rest: Rest,
     read: u32,
     begun: Instant,
 }
 
-impl Pace {
+impl Rests {
     pub(super) fn of(rest: Rest) -> Self {
         Self {
             rest,
