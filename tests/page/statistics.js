@@ -160,6 +160,31 @@ export async function statistics({ browser, program, step, folder }) {
       await page.keyboard.press("Escape");
     });
 
+    await step("shifts, days and weeks begin where they do by the clock on the wall", async () => {
+      // A day of 23 hours; one hour before its end; a shift and a week over the turn of a year.
+      for (const [now, period, since] of [
+        ["2027-03-28T12:00:00+02:00", "day", "2027-03-28T00:00:00+01:00"],
+        ["2027-03-28T23:30:00+02:00", "shift", "2027-03-28T22:00:00+02:00"],
+        ["2027-10-31T03:30:00+01:00", "day", "2027-10-31T00:00:00+02:00"],
+        ["2027-01-01T02:00:00+01:00", "shift", "2026-12-31T22:00:00+01:00"],
+        ["2027-01-01T02:00:00+01:00", "week", "2026-12-28T00:00:00+01:00"],
+        ["2027-04-01T10:00:00+02:00", "week", "2027-03-29T00:00:00+02:00"],
+      ]) {
+        const context = await browser.newContext({ viewport: SIZES.desktop, timezoneId: "Europe/Berlin" });
+        const other = await context.newPage();
+        await other.clock.setFixedTime(new Date(now));
+        const asked = [];
+        other.on("request", (request) => { if (request.url().includes("/api/statistics")) asked.push(new URL(request.url()).searchParams.get("since_us")); });
+        await other.goto(`${url}/#history`);
+        await other.waitForFunction(() => document.querySelector("#statistics-recipe").value !== "");
+        await other.evaluate((value) => { const select = document.querySelector("#statistics-period"); select.value = value; select.dispatchEvent(new Event("change")); }, period);
+        const wanted = String(1000 * Date.parse(since));
+        for (let turn = 0; turn < 100 && !asked.includes(wanted); turn += 1) await new Promise((resolve) => { setTimeout(resolve, 50); });
+        assert.ok(asked.includes(wanted), `${period} at ${now}: ${asked.map((us) => new Date(us / 1000).toISOString())} instead of ${since}`);
+        await context.close();
+      }
+    });
+
     await step("a phone answers the same, in the dark", async () => {
       const phone = await open(SIZES.phone);
       await phone.emulateMedia({ colorScheme: "dark" });
