@@ -1,6 +1,6 @@
 //! Statistics of a recipe over its stored results: a line of JSON for each part of the answer, as it is worked out.
 //!
-//! A thread of its own works, only where a core has nothing else to do, and rests as long as it works; one at a time.
+//! A thread of its own works, only where a core has nothing else to do; one at a time.
 
 use super::downloads::ToClient;
 use super::problem::{Answered, Problem};
@@ -8,7 +8,6 @@ use super::request::Query;
 use super::results::line;
 use super::site::Site;
 use crate::history::Filter;
-use crate::history::course::Rest;
 use crate::history::statistics::{Axis, StatisticsPart, StatisticsRequest};
 use crate::station::MAX_GAUGES;
 use crate::station::control::MAX_RECIPE;
@@ -25,10 +24,6 @@ use tokio::sync::oneshot;
 /// Columns of a chart, unless asked for another number.
 const COLUMNS: usize = 120;
 const MOST_COLUMNS: usize = 1000;
-/// While parts are measured, a rest is as long as the work before.
-const REST: Rest = Rest(1);
-/// A station that has measured nothing for so long, s, has no cycle that could be late.
-const QUIET_S: u32 = 10;
 /// Longest wait for the statistics of others.
 const TURN: Duration = Duration::from_secs(30);
 
@@ -129,13 +124,9 @@ pub(super) async fn statistics(
         let _turn = turn;
         computing::stand_back();
         let mut begun = Some(begun);
-        let now = site.station.snapshot();
-        let last = now.result.as_ref().map_or(0, |result| result.uptime_s);
-        let is_quiet = !now.is_working() && now.uptime_s.saturating_sub(last) > QUIET_S;
-        let rest = if is_quiet { Rest(0) } else { REST };
         let worked = site.history.id().and_then(|id| {
             let of_studies = site.studies.seqs(&id);
-            site.history.statistics(&asked, &of_studies, rest, |part| {
+            site.history.statistics(&asked, &of_studies, |part| {
                 if let StatisticsPart::Results(_) = part
                     && begun.take().is_none_or(|begun| begun.send(Ok(())).is_err())
                 {

@@ -32,7 +32,6 @@ impl Reader {
         &self,
         asked: &StatisticsRequest,
         of_studies: &HashSet<u32>,
-        rest: Rest,
         mut tell: impl FnMut(StatisticsPart) -> bool,
     ) -> HistoryResult<()> {
         let undated = self.undated(&asked.filter)?;
@@ -56,7 +55,7 @@ impl Reader {
                 all,
             };
             let mut gauges: Vec<GaugeSums> = Vec::new();
-            let summed = walk.pass((0.0, Rest(0)), &mut tell, |row| {
+            let summed = walk.pass(0.0, &mut tell, |row| {
                 let gauge = gauge_of(&mut gauges, row, invalid, axis_columns.columns);
                 if row.verdict == Verdict::Invalid {
                 } else if of_studies.contains(&row.seq) {
@@ -70,8 +69,7 @@ impl Reader {
             }
             gauges.iter_mut().for_each(GaugeSums::begin_histogram);
             let mut next = 0;
-            // The figures are shown: what follows has time.
-            let looked = walk.pass((0.5, rest), &mut tell, |row| {
+            let looked = walk.pass(0.5, &mut tell, |row| {
                 if versions.get(next) == Some(&row.seq) {
                     next += 1;
                     // What was usual before is not any more.
@@ -104,17 +102,17 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Takes each value, resting so much, and tells how far it is from `done` on; answers whether it came to the end.
+    /// Takes each value, and tells how far it is from `done` on; answers whether it came to the end.
     fn pass(
         &self,
-        (done, rest): (f64, Rest),
+        done: f64,
         tell: &mut impl FnMut(StatisticsPart) -> bool,
         mut take: impl FnMut(&ValueRow<'_>),
     ) -> rusqlite::Result<bool> {
         let (mut told, mut results, mut seq, mut goes_on) = (Instant::now(), 0, None, true);
         let asked = self.asked;
         let of = (&asked.filter, asked.slot, asked.axis.expression());
-        each_value(self.connection, of, rest, |row| {
+        each_value(self.connection, of, Rest(0), |row| {
             if seq != Some(row.seq) {
                 (seq, results) = (Some(row.seq), results + 1);
                 if told.elapsed() > PERIOD {
