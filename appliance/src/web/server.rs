@@ -27,6 +27,7 @@ use std::convert::Infallible;
 use std::future::{Future, poll_fn};
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -54,6 +55,20 @@ const POST: (Method, MethodFilter) = (Method::POST, MethodFilter::POST);
 const PUT: (Method, MethodFilter) = (Method::PUT, MethodFilter::PUT);
 const DELETE: (Method, MethodFilter) = (Method::DELETE, MethodFilter::DELETE);
 
+type Answering = Pin<Box<dyn Future<Output = Response> + Send>>;
+
+/// Any handler, behind one type: what axum does for a type of handler it does once.
+#[derive(Clone)]
+struct BoxedHandler(Arc<dyn Fn(Request, Site) -> Answering + Send + Sync>);
+
+impl Handler<(), Site> for BoxedHandler {
+    type Future = Answering;
+
+    fn call(self, request: Request, site: Site) -> Answering {
+        (self.0)(request, site)
+    }
+}
+
 fn route<T: 'static>(
     (method, filter): (Method, MethodFilter),
     path: &'static str,
@@ -64,7 +79,12 @@ fn route<T: 'static>(
         method,
         path,
         changes,
-        answer: on(filter, handler),
+        answer: on(
+            filter,
+            BoxedHandler(Arc::new(move |request, site| {
+                Box::pin(handler.clone().call(request, site))
+            })),
+        ),
     }
 }
 

@@ -18,7 +18,7 @@ use serde::Deserialize;
 use serde_json::json;
 use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
 /// Columns of a chart, unless asked for another number.
@@ -26,6 +26,8 @@ const COLUMNS: usize = 120;
 const MOST_COLUMNS: usize = 1000;
 /// Longest wait for the statistics of others.
 const TURN: Duration = Duration::from_secs(30);
+/// Longest wait for a client, all in all: meanwhile the history's log grows.
+const SLOW: Duration = Duration::from_secs(30);
 
 /// Since when results count, besides `since_us`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -123,7 +125,7 @@ pub(super) async fn statistics(
     let work = move || {
         let _turn = turn;
         computing::stand_back();
-        let mut begun = Some(begun);
+        let (mut begun, mut waited) = (Some(begun), Duration::ZERO);
         let worked = site.history.id().and_then(|id| {
             let of_studies = site.studies.seqs(&id);
             site.history.statistics(&asked, &of_studies, |part| {
@@ -132,8 +134,10 @@ pub(super) async fn statistics(
                 {
                     return false;
                 }
+                let since = Instant::now();
                 let said = line(&mut to, &part).and_then(|()| to.flush());
-                said.is_ok()
+                waited += since.elapsed();
+                said.is_ok() && waited < SLOW
             })
         });
         let ended = worked.map_err(|error| match begun.take() {
