@@ -5,6 +5,8 @@
 //! length is bounded, it must have the form that NumPy writes, and nothing is allocated before the
 //! file's length is known to fit the shape.
 
+use std::io::{self, Write};
+
 /// Rows and columns, then the elements row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array<T> {
@@ -128,26 +130,46 @@ pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
 /// The bytes of a version 1.0 file with rows of `columns` elements; an incomplete last row is left
 /// out.
 pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
-    let rows = elements.len() / columns.max(1);
-    let shape = format!("{rows}, {columns}");
-    let mut bytes = preamble(T::KIND, &shape, size_of_val(elements));
-    for element in &elements[..rows * columns] {
-        element.write(&mut bytes);
-    }
+    let mut bytes = Vec::with_capacity(2 * ALIGNMENT + size_of_val(elements));
+    // A vector takes everything.
+    let _ = write_to(&mut bytes, columns, elements);
     bytes
+}
+
+/// Elements that are turned into bytes at a time.
+const PIECE: usize = 16 << 10;
+
+/// Writes what [`write`] answers with, piece by piece.
+///
+/// # Errors
+/// Whatever `out` answers.
+pub fn write_to<T: Element>(
+    out: &mut impl Write,
+    columns: usize,
+    elements: &[T],
+) -> io::Result<()> {
+    let rows = elements.len() / columns.max(1);
+    out.write_all(&preamble(T::KIND, &format!("{rows}, {columns}")))?;
+    let mut bytes = Vec::new();
+    for piece in elements[..rows * columns].chunks(PIECE) {
+        bytes.clear();
+        piece.iter().for_each(|element| element.write(&mut bytes));
+        out.write_all(&bytes)?;
+    }
+    Ok(())
 }
 
 /// The bytes of a version 1.0 file that holds a text, as an array without dimensions.
 pub fn write_text(text: &str) -> Vec<u8> {
     let length = text.chars().count();
-    let mut bytes = preamble(&format!("<U{length}"), "", 4 * length);
+    let mut bytes = preamble(&format!("<U{length}"), "");
     let letters = text.chars().map(|letter| u32::from(letter).to_le_bytes());
     bytes.extend(letters.flatten());
     bytes
 }
 
-/// What comes before the elements, and room for so many bytes of them.
-fn preamble(kind: &str, shape: &str, room: usize) -> Vec<u8> {
+/// What comes before the elements.
+fn preamble(kind: &str, shape: &str) -> Vec<u8> {
     let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     let preamble = MAGIC.len() + 4;
     // The header ends with a newline, and is padded with spaces before it.
@@ -156,7 +178,7 @@ fn preamble(kind: &str, shape: &str, room: usize) -> Vec<u8> {
         text.push(' ');
     }
     text.push('\n');
-    let mut bytes = Vec::with_capacity(preamble + padded + room);
+    let mut bytes = Vec::with_capacity(preamble + padded);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     bytes.extend_from_slice(&u16::try_from(text.len()).unwrap_or(u16::MAX).to_le_bytes());

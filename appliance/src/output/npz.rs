@@ -37,11 +37,8 @@ impl OrganisedMaps {
     /// Whatever `out` answers.
     pub fn write(&self, out: impl Write) -> Result<(), ZipError> {
         let mut zip = ZipWriter::new_stream(out);
-        let mut add = |name: &str, bytes: &[u8]| {
-            zip.start_file(format!("{name}.npy"), stored())?;
-            zip.write_all(bytes).map_err(ZipError::Io)
-        };
-        add("meta", &npy::write_text(&self.meta.to_string()))?;
+        zip.start_file("meta.npy", stored())?;
+        zip.write_all(&npy::write_text(&self.meta.to_string()))?;
         let [x, y, z] = &self.points;
         for (name, values) in [
             ("x", x),
@@ -51,7 +48,8 @@ impl OrganisedMaps {
             ("deviation", &self.deviation),
             ("modulation", &self.modulation),
         ] {
-            add(name, &npy::write(self.width, values))?;
+            zip.start_file(format!("{name}.npy"), stored())?;
+            npy::write_to(&mut zip, self.width, values)?;
         }
         zip.finish().map(drop)
     }

@@ -203,7 +203,8 @@ impl io::Write for ToClient {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let mut chunk = Ok(Bytes::from(std::mem::take(&mut self.chunk)));
+        let next = Vec::with_capacity(self.chunk.len());
+        let mut chunk = Ok(Bytes::from(std::mem::replace(&mut self.chunk, next)));
         let begun = Instant::now();
         loop {
             chunk = match self.sender.try_send(chunk) {

@@ -28,12 +28,12 @@ pub(super) async fn last(site: Site) -> Answered<Response> {
         let _place = place;
         let part = site.last_cycle.ask(JudgedPart::clone);
         let part = part.ok_or_else(|| Problem::missing(GONE))?;
-        let layers = looking_back(|| {
-            let layers = part.plan.layers(part.sequence, &part.frames);
-            layers.ok_or_else(|| Problem::missing(GONE))
-        })?;
         let sigma = part.calibration.sigma.as_ref().map(|sigma| sigma.height_mm);
-        of(site, &Entry::of(&part.record), sigma, Arc::new(layers))
+        looking_back(|| {
+            let layers = part.plan.layers(part.sequence, &part.frames);
+            let layers = layers.ok_or_else(|| Problem::missing(GONE))?;
+            of(site, &Entry::of(&part.record), sigma, Arc::new(layers))
+        })
     })
     .await
 }
@@ -46,7 +46,7 @@ pub(super) async fn kept(site: Site, Path(seq): Path<u32>) -> Answered<Response>
         let judge = site.recipes.manifest(entry.recipe).ok();
         let judge = judge.filter(|file| file.fingerprint.starts_with(&entry.fingerprint));
         let sigma = judge.and_then(|file| Some(file.calibration_sigma?.height_mm));
-        of(site, &entry, sigma, layers)
+        looking_back(|| of(site, &entry, sigma, layers))
     })
     .await
 }

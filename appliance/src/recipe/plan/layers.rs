@@ -66,8 +66,8 @@ fn points(
     let mut all = [const { Vec::new() }; 3];
     for (v, row) in height_mm.chunks(width.max(1)).enumerate().step_by(stride) {
         for (u, &mm) in row.iter().enumerate().step_by(stride) {
-            let height = Height::from_mm(f64::from(mm));
-            let point = triangulator.point(u, v, height);
+            let height = (!mm.is_nan()).then(|| Height::from_mm(f64::from(mm)));
+            let point = height.and_then(|height| triangulator.point(u, v, height));
             let point = point.map_or([f32::NAN; 3], |at| [at.x, at.y, at.z].map(|mm| mm as f32));
             for (plane, mm) in all.iter_mut().zip(point) {
                 plane.push(mm);
