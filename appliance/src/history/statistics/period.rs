@@ -1,6 +1,6 @@
 //! The results of a period, whatever they measured, and the columns of its axis.
 
-use super::parts::{Axis, InvalidReason, RecipeVersion, ResultStatistics, StatisticsRequest};
+use super::parts::{InvalidReason, RecipeVersion, ResultStatistics, StatisticsRequest};
 use crate::history::reader::condition;
 use crate::station::Verdict;
 use rusqlite::{Connection, params_from_iter};
@@ -37,16 +37,9 @@ pub(super) fn results(
         connection.query_row(&bounds, params_from_iter(&values), |row| {
             Ok((row.get(0)?, row.get(1)?))
         })?;
-    let time = |us: Option<u64>| {
-        let us = us.filter(|_| asked.axis == Axis::Time);
-        us.and_then(|us| i64::try_from(us).ok())
-    };
-    // A period is shown whole.
-    let from = from.map(|from| time(asked.filter.since_us).unwrap_or(from));
-    let to = to.map(|to| time(asked.filter.until_us).map_or(to, |until| until - 1));
     let span = from
         .zip(to)
-        .map_or(1, |(from, to)| (to - from).saturating_add(1));
+        .map_or(1, |(from, to)| to.saturating_sub(from).saturating_add(1));
     let columns = asked.columns.min(usize::try_from(span).unwrap_or(1)).max(1);
     let axis_columns = AxisColumns {
         from: from.unwrap_or(0),
