@@ -2,7 +2,7 @@
 //! where they were kept.
 //!
 //! Pictures are computed from the recording by the code that makes those of the last part. That takes
-//! as much memory as a recipe, so it is done for one part at a time, on a thread with a lower priority
+//! as much memory as a recipe, so it is done for one part at a time, on threads with a lower priority
 //! than the measuring task.
 
 use super::downloads::{Download, Packed, send, unpacked};
@@ -222,10 +222,13 @@ pub(super) fn kept_frames(site: &Site, seq: u32) -> Answered<(Entry, PathBuf)> {
     Ok((entry, folder))
 }
 
-/// Works on a thread that gives way to the measuring task.
+/// Threads that work out the maps of a part.
+const LOOKING: usize = 2;
+
+/// Works on threads that give way to the measuring task.
 pub(super) fn looking_back<T: Send>(work: impl FnOnce() -> Answered<T> + Send) -> Answered<T> {
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
+        .num_threads(LOOKING)
         .thread_name(|_| "looking-back".into())
         .start_handler(|_| computing::give_way())
         .build()

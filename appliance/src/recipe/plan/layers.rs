@@ -63,7 +63,8 @@ fn points(
     (height_mm, width): (&[f32], usize),
     stride: usize,
 ) -> [Vec<f32>; 3] {
-    let mut all = [const { Vec::new() }; 3];
+    let room = height_mm.len() / (stride * stride) + width + 1;
+    let mut all = [(); 3].map(|()| Vec::with_capacity(room));
     for (v, row) in height_mm.chunks(width.max(1)).enumerate().step_by(stride) {
         for (u, &mm) in row.iter().enumerate().step_by(stride) {
             let height = (!mm.is_nan()).then(|| Height::from_mm(f64::from(mm)));
