@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Sources: Montgomery, *Introduction to Statistical Quality Control*; Bissell 1990 for the interval of C_pk. Sums have
-//! twice the digits of their terms ([`Sum`]), so that one pass over any number of values gives what two would.
+//! twice the digits of their terms (`Sum`), so that one pass over any number of values gives what two would.
 
 use super::decimal::Decimal;
 use super::distribution::{self, Tail};
