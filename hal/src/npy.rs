@@ -139,7 +139,7 @@ pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
 /// Elements that are turned into bytes at a time.
 const PIECE: usize = 16 << 10;
 
-/// Writes what [`write`] answers with, piece by piece.
+/// Writes what [`write()`] answers with, piece by piece.
 ///
 /// # Errors
 /// Whatever `out` answers.
