@@ -220,21 +220,7 @@ impl Reader {
     /// # Errors
     /// As [`Self::results`].
     pub fn undated(&self, filter: &Filter) -> HistoryResult<u64> {
-        if filter.since_us.is_none() && filter.until_us.is_none() {
-            return Ok(0);
-        }
-        let any_time = Filter {
-            since_us: None,
-            until_us: None,
-            before_seq: None,
-            ..filter.clone()
-        };
-        let (condition, values) = condition(&any_time);
-        let query = format!(
-            "SELECT count(*) FROM dated WHERE {condition} AND coalesce(time_utc_us, browser_utc_us) IS NULL"
-        );
-        let values = params_from_iter(values);
-        self.read(|connection| connection.query_row(&query, values, |row| row.get(0)))
+        self.read(|connection| undated(connection, filter))
     }
 
     /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's
@@ -301,6 +287,24 @@ impl Reader {
         points.reverse();
         Ok(points)
     }
+}
+
+/// [`Reader::undated`] of a state of the history.
+pub(super) fn undated(connection: &Connection, filter: &Filter) -> rusqlite::Result<u64> {
+    if filter.since_us.is_none() && filter.until_us.is_none() {
+        return Ok(0);
+    }
+    let any_time = Filter {
+        since_us: None,
+        until_us: None,
+        before_seq: None,
+        ..filter.clone()
+    };
+    let (condition, values) = condition(&any_time);
+    let query = format!(
+        "SELECT count(*) FROM dated WHERE {condition} AND coalesce(time_utc_us, browser_utc_us) IS NULL"
+    );
+    connection.query_row(&query, params_from_iter(values), |row| row.get(0))
 }
 
 /// The result of a row of the view `dated`, with its gauges.

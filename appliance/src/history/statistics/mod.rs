@@ -34,11 +34,9 @@ impl Reader {
         of_studies: &HashSet<u32>,
         mut tell: impl FnMut(StatisticsPart) -> bool,
     ) -> HistoryResult<()> {
-        let undated = self.undated(&asked.filter)?;
         self.read(|connection| {
             let connection = connection.unchecked_transaction()?;
-            let (mut results, axis_columns) = results(&connection, asked, of_studies)?;
-            results.undated = undated;
+            let (results, axis_columns) = results(&connection, asked, of_studies)?;
             let versions: Vec<u32> = results.versions.iter().map(|version| version.seq).collect();
             let Counts {
                 pass,
@@ -70,7 +68,8 @@ impl Reader {
             gauges.iter_mut().for_each(GaugeSums::begin_histogram);
             let mut next = 0;
             let looked = walk.pass(0.5, &mut tell, |row| {
-                if versions.get(next) == Some(&row.seq) {
+                let has_come = |first: &u32| row.seq.wrapping_sub(*first).cast_signed() >= 0;
+                while versions.get(next).is_some_and(has_come) {
                     next += 1;
                     // What was usual before is not any more.
                     gauges.iter_mut().for_each(GaugeSums::begin_anew);

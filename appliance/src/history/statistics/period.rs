@@ -1,7 +1,7 @@
 //! The results of a period, whatever they measured, and the columns of its axis.
 
 use super::parts::{InvalidReason, RecipeVersion, ResultStatistics, StatisticsRequest};
-use crate::history::reader::condition;
+use crate::history::reader::{condition, undated};
 use crate::station::Verdict;
 use rusqlite::{Connection, params_from_iter};
 use std::collections::{BTreeMap, HashSet};
@@ -50,6 +50,7 @@ pub(super) fn results(
         axis: asked.axis,
         from,
         to,
+        undated: undated(connection, &asked.filter)?,
         columns: vec![[0; 3]; columns],
         ..ResultStatistics::default()
     };

@@ -83,11 +83,12 @@ impl GaugeSums {
         {
             let first = Decimal::of(value).unwrap_or_default();
             self.groups.push(RunningGroup::new(bounds, first));
-            self.starts.push(row.x);
+            self.starts.push(None);
         }
-        let Some(group) = self.groups.last_mut() else {
+        let Some((group, start)) = self.groups.last_mut().zip(self.starts.last_mut()) else {
             return;
         };
+        *start = start.or(row.x);
         let Some(offset) = group.offset(value) else {
             return;
         };

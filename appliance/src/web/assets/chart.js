@@ -40,7 +40,8 @@ export function runChart(svg, width, results, gauge, marks) {
   const parts = [];
   const rest = [];
   gauge.groups.forEach((group, at) => {
-    const begin = gauge.starts[at] === null ? LEFT : x(gauge.starts[at]);
+    if (gauge.starts[at] === null) return;
+    const begin = x(gauge.starts[at]);
     const next = gauge.starts[at + 1];
     const end = next === undefined || next === null ? width - RIGHT : x(next);
     if (group.control) {

@@ -2,7 +2,7 @@
 import { fill, make } from "./element.js";
 import { unitOf } from "./api.js";
 import { limits, quantity } from "./number.js";
-import { LEFT_OUT, decided, tag } from "./verdict.js";
+import { decided, tag } from "./verdict.js";
 import { alter, foundOf, gaugeKind, inUnits, proposal, state, wayOf, waysOf } from "./editor-list.js";
 import { nameField, number, parameter, select } from "./editor-fields.js";
 
@@ -60,9 +60,7 @@ function judgement(gauge, place) {
   const of = foundOf("gauges", gauge), unit = unitOf(state.kinds, gauge).unit, parts = [];
   if (of && of.value === null) parts.push(make("p", "bad", `no value: ${of.reason || "golden has nothing to measure here"}`));
   if (of && of.value !== null) {
-    const expanded = make("b", "", of.u ? `U ${quantity(of.u, unit, 1)}` : "U not known");
-    if (gauge.kind === "deviation") expanded.title = `U is of the mean over a square: ${LEFT_OUT}`;
-    parts.push(make("p", "", make("b", "", quantity(of.value, unit)), ` on golden${of.sigma ? `, σ ${quantity(of.sigma, unit, 1)}` : ""}, `, expanded, `; limits ${limits(of.low, of.high, unit)}`));
+    parts.push(make("p", "", make("b", "", quantity(of.value, unit)), ` on golden${of.sigma ? `, σ ${quantity(of.sigma, unit, 1)}` : ""}, `, make("b", "", of.u ? `U ${quantity(of.u, unit, 1)}` : "U not known"), `; limits ${limits(of.low, of.high, unit)}`));
     if (of.too_fine) parts.push(make("p", "bad", `⚠ too fine for this head: the limits are less than 4 U = ${quantity(4 * of.u, unit)} apart`));
     if (of.u_rims > of.u / 2) parts.push(make("p", "quiet", `${quantity(of.u_rims, unit, 1)} of U is for rims: state at the feature or its plane whether they are sharp. With the value of a master, U is ${quantity(of.u_master, unit, 1)}`));
     const least = (of.u || 0) + NOISE * (of.sigma || 0);

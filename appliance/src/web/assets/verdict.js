@@ -15,7 +15,7 @@ export function decided({ decision }) {
 }
 
 // What U of a deviation, which is a mean over a square, leaves out.
-export const LEFT_OUT = "what that mean takes off a narrower dent is not in it";
+const LEFT_OUT = "what that mean takes off a narrower dent is not in it";
 
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
 // "± –" if no σ is known. A deviation is a mean, which a dent narrower than its square changes by less than the dent's depth.
