@@ -7,7 +7,7 @@ import { join } from "node:path";
 
 const PATIENCE_MS = 60000;
 
-const head = (pixels) => `sub_rays = 2
+export const head = (pixels) => `sub_rays = 2
 [rig.camera]
 width = ${pixels}
 height = ${pixels}

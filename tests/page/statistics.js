@@ -4,18 +4,14 @@ import { strict as assert } from "node:assert";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { Daemon, Place } from "./daemon.js";
+import { Daemon, Place, head } from "./daemon.js";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const SIZES = { desktop: { width: 1440, height: 900 }, phone: { width: 390, height: 844 } };
 // Parts before and after the die wears out.
 const [GOOD, WORN] = [34, 16];
 
-const WORN_DIE = `sub_rays = 2
-[rig.camera]
-width = 256
-height = 256
-[part]
+const WORN_DIE = `${head(256)}[part]
 kind = "sheet_metal"
 defects = [{ kind = "dent", x = 0.0, y = -8.0, depth_mm = 0.1, diameter_mm = 30.0 }]
 `;
@@ -74,8 +70,8 @@ export async function statistics({ browser, program, step, folder }) {
       await on.waitForFunction((count) => window.printed > count, before);
       await on.emulateMedia({ media: "print" });
       shown = await on.evaluate(() => [...document.querySelectorAll("main section, main form, main figure, header, footer, nav")].filter((one) => one.id && one.offsetParent).map((one) => one.id));
-      const head = await on.textContent("#report-head");
-      for (const words of ["serial", "fingerprint", "Calibration", "Program", "by Ann Other"]) assert.ok(head.includes(words), `${kind}: ${words} is missing in ${head}`);
+      const said = await on.textContent("#report-head");
+      for (const words of ["serial", "fingerprint", "Calibration", "Program", "by Ann Other"]) assert.ok(said.includes(words), `${kind}: ${words} is missing in ${said}`);
       await on.emulateMedia({ media: null });
       // The browser ends the report when it has printed.
       const file = await on.pdf({ format, ...(folder ? { path: join(folder, `report-${kind}-${format}.pdf`) } : {}) });

@@ -93,6 +93,21 @@ export async function studies({ browser, program, step, folder, full }) {
     });
 
     await step("the study is accessible, light and dark, on a phone and a desktop", accessible);
+    await step("the report on paper has what is folded on the screen", async () => {
+      const folded = () => page.locator("#study-report details:not([open])").count();
+      const before = await folded();
+      assert.ok(before > 0);
+      await page.evaluate(() => { window.print = () => {}; });
+      await page.click("[data-report=study]");
+      await page.keyboard.press("Enter");
+      await page.waitForFunction(() => document.body.dataset.report === "study");
+      assert.equal(await folded(), 0);
+      await page.emulateMedia({ media: "print" });
+      assert.ok(await page.isVisible("#study-report details table"));
+      await page.emulateMedia({ media: null });
+      await page.evaluate(() => window.dispatchEvent(new Event("afterprint")));
+      assert.equal(await folded(), before);
+    });
   } finally {
     await page.context().close();
     await daemon.end("SIGKILL");

@@ -2,14 +2,9 @@
 // chosen by pointer or keys: one opens a result, several become a list.
 import { draw, fill } from "./element.js";
 import { date, quantity } from "./number.js";
+import { round } from "./scale.js";
 
 const HEIGHT = 300, LEFT = 86, RIGHT = 14, TOP = 22, BOTTOM = 30;
-
-// The smallest of 1, 2, 5 × 10ⁿ that is at least `least`.
-function round(least) {
-  const decade = Math.pow(10, Math.floor(Math.log10(least)));
-  return [1, 2, 5, 10].map((factor) => factor * decade).find((step) => step >= least * 0.999999);
-}
 
 // Where something is on the axis, in words.
 export function place(axis, x) {

@@ -89,7 +89,5 @@ export function moment(entry, boot) {
     const since = `${Math.floor(entry.uptime_s / 3600)}:${two(entry.uptime_s / 60 % 60)}:${two(entry.uptime_s % 60)}`;
     return `${since} after ${!entry.boot_id || entry.boot_id === boot ? "the" : "an earlier"} start`;
   }
-  const date = new Date(utc_us / 1000);
-  const two = (number) => String(number).padStart(2, "0");
-  return `${about(entry) ? "≈ " : ""}${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${date.toLocaleTimeString("en-GB")}`;
+  return `${about(entry) ? "≈ " : ""}${date(utc_us).slice(0, 10)} ${clock(utc_us)}`;
 }

@@ -49,6 +49,8 @@ async function print(kind) {
   fill($("report-head"), make("h1", "", title), make("dl", "", ...facts.map(([what, words]) => make("div", "", make("dt", "", what), make("dd", "", words)))));
   document.body.dataset.report = kind;
   for (const id of shown) $(id).classList.add("printed");
+  // What is folded on the screen is on the paper.
+  for (const one of document.querySelectorAll(".printed details:not([open])")) { one.open = true; one.classList.add("unfolded"); }
   if (kind === "period") drawFor(PAPER);
   document.title = `${title} · ${now.identity.serial}`;
   window.print();
@@ -58,6 +60,7 @@ function done() {
   if (!document.body.dataset.report) return;
   delete document.body.dataset.report;
   document.adoptedStyleSheets = [];
+  for (const one of document.querySelectorAll(".unfolded")) { one.open = false; one.classList.remove("unfolded"); }
   for (const one of document.querySelectorAll(".printed")) one.classList.remove("printed");
   drawFor(0);
 }

@@ -4,7 +4,7 @@ import { colours } from "./colour.js";
 import { signed } from "./number.js";
 
 // The smallest of 1, 2, 5 × 10ⁿ that is at least `least`.
-function round(least) {
+export function round(least) {
   const decade = Math.pow(10, Math.floor(Math.log10(least)));
   return [1, 2, 5, 10].map((factor) => factor * decade).find((step) => step >= least * 0.999999);
 }
