@@ -3,6 +3,8 @@
 //! ARCHITECTURE.md describes the modules below, here called rooms, and the order in which they may
 //! import each other; `tests/suite/rooms.rs` checks it.
 
+pub mod access;
+pub mod backup;
 pub mod cli;
 pub mod config;
 pub mod error;

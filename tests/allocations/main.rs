@@ -38,6 +38,7 @@ fn naming() -> Naming {
         number: 1,
         part_number: "P".into(),
         name: "part".into(),
+        taught_by: String::new(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: None,

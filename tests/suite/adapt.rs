@@ -251,6 +251,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         number: 7,
         part_number: "S".into(),
         name: "sphere".into(),
+        taught_by: String::new(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: None,

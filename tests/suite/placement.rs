@@ -113,6 +113,7 @@ pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
         number: 1,
         part_number: "P".into(),
         name: "part".into(),
+        taught_by: String::new(),
         taught_at_unix_s: 0,
         placement_tolerance_mm,
         exposures: None,

@@ -3,11 +3,11 @@
 
 use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
+use appliance::access::{Access, Record};
 use appliance::history::{self, Bounds, Filter, Numbering, OpenedHistory, Reader};
 use appliance::recipe::Store;
 use appliance::recipe::file::archive;
 use appliance::storage::state::{Counted, StateFolder};
-use appliance::web::access::Access;
 use hal::replay::Recording;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -232,9 +232,10 @@ impl Promise {
         }
         let words = |error: &dyn std::fmt::Display| error.to_string();
         let folder = StateFolder::open(state).map_err(|error| words(&error))?;
-        let (_, new_secret) =
-            Access::open(&state.join("access"), None).map_err(|error| words(&error))?;
-        if self.begun && new_secret.is_some() {
+        let record = Record::of(state, 16 << 20);
+        let opened = Access::open(&state.join("access"), None, record.clone());
+        let made = opened.map_err(|error| words(&error))?.made;
+        if self.begun && made.is_some() {
             return Err("the secret is gone".into());
         }
         self.check_recipes(&folder)?;

@@ -167,6 +167,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         number: 1,
         part_number: "PART".into(),
         name: "part".into(),
+        taught_by: String::new(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: None,

@@ -10,7 +10,9 @@ macro_rules! say {
     }};
 }
 
+mod backup;
 mod calibrate;
+mod changes;
 mod completions;
 mod config;
 mod demo;
@@ -104,6 +106,10 @@ commands! {
     /// Release a station for production: capability of a gauge, Gage R&R, process.
     #[command(subcommand)]
     Study(study::StudyCommand);
+    /// Show or check the record of changes: who changed what and when.
+    Changes(changes::Changes);
+    /// Back up what the device has learned, or check a backup.
+    Backup(backup::Backup);
     /// Judge a part that did not pass again and compare with the history.
     Replay(replay::Replay);
     /// List, export, import or delete recipes, undo that, or change the gauges of one.

@@ -2,11 +2,13 @@
 //! head.
 
 use super::numbers::{address, number, numbers};
+use crate::access::{Change, Record};
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure, Result};
 use crate::head::placed::Placed;
 use crate::production::backend;
 use crate::storage::state::StateFolder;
+use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, Args, Command};
@@ -122,6 +124,26 @@ impl Files {
         match self.configuration()?.state {
             Some(path) => Ok(path),
             None => StateFolder::default_path(),
+        }
+    }
+
+    /// The record of changes in the state folder.
+    ///
+    /// # Errors
+    /// As [`Self::state_folder`].
+    pub fn record(&self) -> Result<Record> {
+        let most = u64::from(self.configuration()?.access.record_mib) << 20;
+        Ok(Record::of(&self.state_folder()?, most))
+    }
+
+    /// Records what a command has changed. That it was done is not taken back where this fails.
+    pub fn note(&self, change: &Change) {
+        let noted = self.record().and_then(|record| {
+            let failed = Exit::CannotCreate.advising("record the change", "free space");
+            record.add(change).map_err(failed)
+        });
+        if let Err(failure) = noted {
+            journal::write(Severity::Warning, &failure.to_string());
         }
     }
 

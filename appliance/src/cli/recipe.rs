@@ -7,6 +7,7 @@
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Json, Quiet};
+use crate::access::Change;
 use crate::error::{Exit, Failure, Result};
 use crate::production::backend;
 use crate::recipe::file::archive::{self, Arrays};
@@ -130,6 +131,11 @@ impl RecipeCommand {
                 };
                 let imported = store.import(file, to, "add --replace", fits)?;
                 let id = &imported.id;
+                files.note(&Change {
+                    changed: Some(imported.changed()),
+                    fingerprint: Some(id.fingerprint.clone()),
+                    ..Change::of_command("import recipe", format!("recipes/{}", id.number))
+                });
                 let digits = id.fingerprint.get(..8).unwrap_or_default();
                 let note = imported.note();
                 let note = note.map_or_else(String::new, |note| format!(": {note}"));
@@ -146,6 +152,10 @@ impl RecipeCommand {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Delete")?;
                 Store::of_state(&state)?.delete(number)?;
+                let subject = format!("recipes/{number}");
+                recipe
+                    .files
+                    .note(&Change::of_command("delete recipe", subject));
                 let undo = format!("`fringed recipe undo {number}` brings it back");
                 let words = || format!("recipe {number} is deleted; {undo}");
                 recipe.quiet.say(words);
@@ -159,6 +169,10 @@ impl RecipeCommand {
                 let calibration = calibration.map(|calibration| calibration.fingerprint());
                 let store = Store::of_state(&state)?;
                 let file = store.undo(number, calibration.as_deref())?;
+                recipe.files.note(&Change {
+                    changed: Some(format!("fingerprint {:.8}", file.fingerprint)),
+                    ..Change::of_command("undo recipe", format!("recipes/{number}"))
+                });
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 recipe.quiet.say(|| {
                     format!(

@@ -4,6 +4,7 @@ use super::names;
 use super::numbers::number;
 use super::options::Measuring;
 use super::options::SimulatedPart;
+use crate::access::Change;
 use crate::config::Config;
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibrated::EmptyStation;
@@ -190,6 +191,12 @@ impl Teach {
             .map_err(Exit::Content.because("teach"))?;
         let place = target.store(&taught)?;
         let file = &taught.manifest;
+        if let Target::State(_) = target {
+            options.files.note(&Change {
+                fingerprint: Some(file.fingerprint.clone()),
+                ..Change::of_command("teach recipe", format!("recipes/{}", file.number))
+            });
+        }
         let summary = serde_json::json!({
             "number": file.number,
             "fingerprint": file.fingerprint,

@@ -49,6 +49,8 @@ bounded! {
         pub modbus: ModbusConfig = Fields,
         /// The page, for the technician.
         pub http: HttpConfig = Fields,
+        /// Who may look, and the record of changes.
+        pub access: AccessConfig = Fields,
         /// The devices.
         pub head: HeadConfig = Fields,
         /// Digital lines: start, busy, ok and fault.
@@ -136,6 +138,16 @@ bounded! {
         pub proxies: Vec<IpNet>,
     }
 
+    /// Who may look, and the record of changes.
+    pub struct AccessConfig: Default {
+        /// Who may look at the page.
+        pub looking: Looking,
+        /// Networks of programs that collect results or watch the station without a login.
+        pub collectors: Vec<IpNet>,
+        /// The most MiB of the record of changes.
+        pub record_mib: u32 = 1..=1024 => 16,
+    }
+
     /// The devices.
     pub struct HeadConfig: Default {
         /// Which kind of head.
@@ -160,6 +172,17 @@ bounded! {
         #[serde(skip)]
         pub exposing: Option<Exposing>,
     }
+}
+
+/// Who may look at the page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Looking {
+    /// Everybody who reaches it.
+    #[default]
+    Anyone,
+    /// Users who have signed in, and `access.collectors`.
+    SignedIn,
 }
 
 /// The kinds of head.
@@ -283,6 +306,7 @@ impl Config {
             ("modbus.readers", modbus.readers.len()),
             ("modbus.writers", modbus.writers.len()),
             ("http.hosts", self.http.hosts.len()),
+            ("access.collectors", self.access.collectors.len()),
             ("head.recordings", self.head.recordings.len()),
         ] {
             length(key, count, 0, MAX_LISTED)?;

@@ -2,6 +2,7 @@
 //! that collect results, and as CSV after RFC 4180, one line per result, the gauges in columns of their
 //! own. With it times as text in ISO 8601, UTC, and back.
 
+use super::carry::{self, EarlierHistory};
 use super::entry::{Entry, Filter};
 use super::reader::{Reader, condition, read, rows};
 use super::{HistoryError, HistoryResult};
@@ -23,6 +24,7 @@ pub struct After {
     connection: Connection,
     path: PathBuf,
     id: String,
+    earlier: Vec<EarlierHistory>,
     /// The last SEQ that is behind the reader.
     seq: u32,
     /// Results that may still be read.
@@ -54,6 +56,8 @@ impl Reader {
         let id = connection.query_row("SELECT id FROM history", (), |row| row.get(0));
         Ok(After {
             id: id.map_err(failed)?,
+            // A history that no program has opened for writing since has no such table.
+            earlier: carry::earlier(&connection).unwrap_or_default(),
             connection,
             path: self.path().to_path_buf(),
             seq,
@@ -67,6 +71,11 @@ impl After {
     /// Which history it is: [`Reader::id`].
     pub fn id(&self) -> &str {
         &self.id
+    }
+
+    /// The ids that it had before, the newest first.
+    pub fn earlier(&self) -> &[EarlierHistory] {
+        &self.earlier
     }
 
     /// The next page; the first says where the walk ends. Where results that are next were deleted

@@ -18,6 +18,7 @@
 //! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
 //! costs what was not synced yet: what came in the time that the card takes for one sync.
 
+pub mod carry;
 pub mod course;
 pub mod design;
 pub mod entry;
@@ -46,9 +47,11 @@ pub use task::Task;
 pub use writer::Writer;
 
 use crate::recipe::Store;
+use crate::storage::state::{Counted, CounterError};
 use handle::MAX_WAITING;
 use seqs::AHEAD;
-use spool::{SLOTS, Spool, is_after};
+pub use spool::is_after;
+use spool::{SLOTS, Spool};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -124,6 +127,26 @@ pub struct OpenedHistory {
     pub complaint: Option<String>,
 }
 
+/// The number that a copy of a state goes on with behind `last`, as it is not known how far the
+/// original went; `run` is random.
+fn beyond(last: u32, run: u32, utc_s: Option<u64>) -> u32 {
+    let by_time = utc_s.and_then(by_time);
+    let by_time = by_time.filter(|&next| is_after(next, last));
+    by_time.unwrap_or_else(|| last.wrapping_add(RESTORED + run % APART).wrapping_add(1))
+}
+
+/// The last SEQ that the run before has shown and the results that are still in memory, where that is
+/// known; all that is there where the counter is lost.
+fn shown_of(
+    spool: Option<&Spool>,
+    counted: &Result<Counted, CounterError>,
+) -> Option<(u32, Vec<Entry>)> {
+    match counted {
+        Ok(counted) => spool?.of_run(counted.run),
+        Err(_) => spool?.of_any_run(),
+    }
+}
+
 /// The number that a copy goes on with at a time: behind those of every copy that began before.
 fn by_time(utc_s: u64) -> Option<u32> {
     let since = utc_s.checked_sub(YEAR_2026_S)?;
@@ -146,10 +169,7 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> HistoryResult
     // Where the system has no shared memory, or another process has it, a kill skips numbers and
     // loses results that wait.
     let spool = Spool::open(&numbering.serial, owner.uid()).ok();
-    let found = spool.as_ref().and_then(|spool| match &numbering.counted {
-        Ok(counted) => spool.of_run(counted.run),
-        Err(_) => spool.of_any_run(),
-    });
+    let found = shown_of(spool.as_ref(), &numbering.counted);
     let counted = numbering.counted.as_ref().copied().unwrap_or_default();
     let of_run = found.as_ref().and(spool.as_ref());
     let buffered = of_run.and_then(Spool::buffered).unwrap_or(counted.buffered);
@@ -162,14 +182,11 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> HistoryResult
     // number.
     let last = stored.filter(|&seq| is_after(seq, last)).unwrap_or(last);
     let lost = numbering.counted.as_ref().err();
-    let skipped = match lost {
-        Some(_) => UNKNOWN,
-        None if restored => RESTORED + numbering.run % APART,
-        None => 0,
+    let next = match lost {
+        Some(_) => last.wrapping_add(UNKNOWN + 1),
+        None if restored => beyond(last, numbering.run, numbering.utc_s),
+        None => last.wrapping_add(1),
     };
-    let by_time = numbering.utc_s.filter(|_| restored).and_then(by_time);
-    let by_time = by_time.filter(|&next| is_after(next, last));
-    let next = by_time.unwrap_or(last.wrapping_add(skipped).wrapping_add(1));
     let lost = lost.map(|problem| {
         numbering.counter.put_aside();
         format!(

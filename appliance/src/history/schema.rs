@@ -28,6 +28,7 @@ fn tables() -> String {
     format!(
         "
 CREATE TABLE history (id TEXT NOT NULL);
+{EARLIER};
 INSERT INTO history VALUES (lower(hex(randomblob(16))));
 CREATE TABLE result (
     id INTEGER PRIMARY KEY,
@@ -91,11 +92,21 @@ pub(super) fn open_read_only(path: &Path) -> HistoryResult<Connection> {
         .or_else(|_| Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY))
         .map_err(failed)?;
     connection.busy_timeout(BUSY).map_err(failed)?;
-    match version(&connection).map_err(failed)? {
-        (APPLICATION, VERSION) => connection.execute_batch(DATED).map_err(failed)?,
-        found => return Err(strange(path, found)),
-    }
+    refuse_other(&connection, path)?;
+    connection.execute_batch(DATED).map_err(failed)?;
     Ok(connection)
+}
+
+/// Refuses what is not a history of this version.
+///
+/// # Errors
+/// [`HistoryError`]
+pub(super) fn refuse_other(connection: &Connection, path: &Path) -> HistoryResult<()> {
+    let found = version(connection).map_err(|error| HistoryError::of(path, &error))?;
+    match found {
+        (APPLICATION, VERSION) => Ok(()),
+        found => Err(strange(path, found)),
+    }
 }
 
 fn settle(connection: &Connection) -> rusqlite::Result<()> {
@@ -162,7 +173,11 @@ fn create(connection: &mut Connection) -> rusqlite::Result<()> {
 const REQUESTED: &str =
     "CREATE INDEX IF NOT EXISTS result_request ON result (request) WHERE request IS NOT NULL";
 
-/// Adds the columns that a history of this version lacks which was begun before they were thought of.
+/// The ids that the history had before, each with the last SEQ under it.
+const EARLIER: &str =
+    "CREATE TABLE IF NOT EXISTS earlier (id TEXT NOT NULL, last INTEGER NOT NULL)";
+
+/// Adds the columns and the table that a history of this version lacks which was begun before they were thought of.
 fn complete(connection: &Connection) -> rusqlite::Result<()> {
     for column in ["light", "request"] {
         if connection
@@ -173,7 +188,8 @@ fn complete(connection: &Connection) -> rusqlite::Result<()> {
             connection.execute_batch(&add)?;
         }
     }
-    connection.execute_batch(REQUESTED)
+    connection.execute_batch(REQUESTED)?;
+    connection.execute_batch(EARLIER)
 }
 
 fn strange(path: &Path, (application, version): (i64, i64)) -> HistoryError {

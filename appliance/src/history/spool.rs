@@ -36,7 +36,7 @@ pub struct Spool {
 }
 
 /// Whether a SEQ comes after another one. They start anew after 2³² − 1.
-pub(super) fn is_after(seq: u32, other: u32) -> bool {
+pub fn is_after(seq: u32, other: u32) -> bool {
     seq.wrapping_sub(other) as i32 > 0
 }
 

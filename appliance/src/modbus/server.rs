@@ -74,7 +74,7 @@ pub async fn serve(
                 word_order: options.config.word_order,
                 strict_unit_id: options.config.strict_unit_id,
                 flaw: flaw.clone(),
-                edges: Mutex::new(ConnectionEdges::of(Client::Plc(number))),
+                edges: Mutex::new(ConnectionEdges::of(Client::Plc(number, peer.ip()))),
                 peer: peer.ip(),
                 may_write,
                 refusals: refusals.clone(),

@@ -76,6 +76,7 @@ impl Worker {
             everything,
             ref marking,
             limit_um,
+            ref by,
         } = teaching;
         if let Some(problem) = &self.opened.problem {
             return Err(TeachError::NotCalibrated(problem.clone()));
@@ -89,6 +90,9 @@ impl Worker {
         naming.everything = everything.unwrap_or(naming.everything);
         naming.marking = marking.clone().unwrap_or(naming.marking);
         naming.empty = self.empty_station();
+        if let Some(by) = by {
+            naming.taught_by = by.to_string();
+        }
         naming.limit_mm = limit_um
             .map(|um| f64::from(um) / 1000.0)
             .or(naming.limit_mm);

@@ -9,6 +9,8 @@ pub mod survey;
 
 pub use crate::system::caller::Caller;
 
+use crate::access::{Access, NewSecret, OpenedAccess, Record};
+use crate::backup::Backups;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Current;
@@ -23,8 +25,8 @@ use crate::recipe::Store;
 use crate::recipe::teach::part::LastSeen;
 use crate::station::snapshot::status;
 use crate::station::{
-    Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, RecipeKey, RecipeResult,
-    Request, Settings, Snapshot, Station, StationHandle, Teaching,
+    Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, PlcOrder, RecipeKey,
+    RecipeResult, Request, Settings, Snapshot, Station, StationHandle, Teaching,
 };
 use crate::storage::state::{StateFolder, random};
 use crate::system::caller::StopSignal;
@@ -32,17 +34,19 @@ use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
 use crate::system::{clock, runtime, socket, stderr};
-use crate::web::access::{Access, NewSecret};
 use rooms::Rooms;
 use sim::Stage;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
+use std::sync::mpsc::{SyncSender, TrySendError};
 use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::Instant;
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 
+/// Orders of the PLC that wait to be recorded; more are not.
+const MOST_ORDERS: usize = 256;
 /// Time between two checks for the stop signal during the start.
 const POLLING: std::time::Duration = std::time::Duration::from_millis(20);
 
@@ -60,12 +64,14 @@ pub struct Daemon {
     awaited: bool,
     /// The way to the measuring task.
     orders: mpsc::Sender<Order>,
+    /// What the PLC orders, to be recorded; nothing ends the thread that does.
+    ordered: SyncSender<Option<(IpAddr, PlcOrder)>>,
     /// Ends the threads of the sockets and of the lines.
     sockets: watch::Sender<bool>,
     /// Ends the survey's thread once it is dropped.
     survey: mpsc::Sender<()>,
-    /// The threads that measure, serve sockets, survey and serve lines.
-    threads: [JoinHandle<()>; 4],
+    /// The threads that measure, serve sockets, survey, serve lines and record what the PLC orders.
+    threads: [JoinHandle<()>; 5],
     /// The thread of the history.
     writing: JoinHandle<()>,
     history: History,
@@ -98,8 +104,14 @@ impl Daemon {
         // From here on no thread waits until stderr is read.
         stderr::detach();
         let state = StateFolder::open(&path)?;
+        let record = Record::of(&path, u64::from(config.access.record_mib) << 20);
+        let utc_s = clock::utc_us().map(|us| us / 1_000_000);
+        // Before anything of the state is used.
+        if let Some(words) = Backups::of(&path).carry_out(&state, &record, utc_s)? {
+            progress.report(Severity::Notice, &words);
+        }
         let recipes = Store::of_state(&state)?;
-        let access = open_access(&state, &progress)?;
+        let access = open_access(&state, record.clone(), &progress)?;
         let wires = backend::lines(&config.lines)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
@@ -117,11 +129,13 @@ impl Daemon {
         }
         let buffered = left_of(&state, buffered, &progress);
         let aborts = Aborts::default();
+        let (ordered, recorded) = mpsc::sync_channel(MOST_ORDERS);
         let sink = effects(
             orders.clone(),
             aborts.clone(),
             history.clone(),
             progress.clone(),
+            ordered.clone(),
         );
         let settings = station(config, &state, (next_seq, buffered))?;
         let station = StationHandle::new(settings, Instant::now(), sink);
@@ -148,9 +162,10 @@ impl Daemon {
             stopped,
         };
         let computing = rooms.computing.clone();
+        let recording = rooms.record(record, recorded)?;
         let writing = rooms.history(task)?;
         let wiring = rooms.lines(wires)?;
-        let serving = rooms.sockets(runtime, plc, page, access)?;
+        let serving = rooms.sockets(runtime, plc, page, (access, caller))?;
         let (survey, surveying) = rooms.survey()?;
         let first = first_request(config, &rooms.recipes);
         let awaited = first.is_some();
@@ -163,9 +178,10 @@ impl Daemon {
             stage: None,
             awaited,
             orders,
+            ordered,
             sockets,
             survey,
-            threads: [measuring, serving, surveying, wiring],
+            threads: [measuring, serving, surveying, wiring, recording],
             writing,
             history,
             progress,
@@ -247,11 +263,16 @@ fn opened_head(
 const SECRET: &str = "fringed.secret";
 
 /// Opens the access control; the secret of a new device is written to stderr here and never again.
-fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access> {
+fn open_access(state: &StateFolder, record: Record, progress: &Progress) -> Result<Access> {
     let folder = state.path().join("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
-    let (access, made) = Access::open(&folder, given.as_deref())?;
+    let OpenedAccess {
+        access,
+        made,
+        complaint,
+    } = Access::open(&folder, given.as_deref(), record)?;
+    complaint.inspect(|complaint| progress.warn(complaint));
     if let Some(NewSecret { secret, complaint }) = made {
         if let Some(complaint) = complaint {
             progress.warn(&complaint);
@@ -350,6 +371,7 @@ fn effects(
     aborts: Aborts,
     history: History,
     progress: Progress,
+    ordered: SyncSender<Option<(IpAddr, PlcOrder)>>,
 ) -> impl FnMut(Effect) -> Option<Event> {
     // If the measuring task is gone, the order is lost, and the station's deadline for the job
     // passes.
@@ -360,6 +382,12 @@ fn effects(
             Effect::Load { job, key } => order(Order::Load(job, key)),
             Effect::Teach { job, teaching } => order(Order::Teach(job, teaching)),
             Effect::Commission { job } => order(Order::Commission(job)),
+            Effect::Ordered { from, order } => {
+                if let Err(TrySendError::Full(_)) = ordered.try_send(Some((from, order))) {
+                    let words = "an order of the PLC is not recorded: the storage is too slow";
+                    progress.log(words);
+                }
+            }
             Effect::PersistSeq(seq) => {
                 let failed = history.take(seq).err();
                 return Some(Event::Stored { seq, failed });

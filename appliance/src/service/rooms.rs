@@ -3,7 +3,9 @@
 
 use super::Daemon;
 use super::survey::Survey;
-use crate::config::Config;
+use crate::access::{Access, Change, Record, Way};
+use crate::backup::Backups;
+use crate::config::{Config, Looking};
 use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
@@ -21,14 +23,14 @@ use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
 use crate::recipe::teach::part::LastSeen;
-use crate::station::{Event, Request, StationHandle, tick};
+use crate::station::{Event, PlcOrder, RecipeKey, Request, StationHandle, tick};
 use crate::system::caller::Caller;
 use crate::system::clock;
 use crate::system::computing::Computing;
 use crate::system::progress::Progress;
-use crate::web::access::Access;
 use crate::{lines, modbus, web};
 use sim::Stage;
+use std::net::IpAddr;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{Builder, JoinHandle};
@@ -68,6 +70,35 @@ impl Rooms<'_> {
         spawn("history", move || task.run(&station))
     }
 
+    /// Records what the PLC orders, until nothing comes.
+    pub fn record(&self, record: Record, orders: Receiver<Option<(IpAddr, PlcOrder)>>) -> Room {
+        let (station, progress) = (self.station.clone(), self.progress.clone());
+        spawn("recording orders", move || {
+            while let Ok(Some((from, order))) = orders.recv() {
+                let snapshot = station.snapshot();
+                let (action, subject) = match order {
+                    PlcOrder::Teach(number) => ("teach recipe", format!("recipes/{number}")),
+                    PlcOrder::Load(RecipeKey::Number(number)) => {
+                        ("load recipe", format!("recipes/{number}"))
+                    }
+                    PlcOrder::Load(RecipeKey::PartNumber(part)) => {
+                        ("load recipe", format!("part number {part}"))
+                    }
+                };
+                let change = Change {
+                    uptime_s: Some(snapshot.uptime_s),
+                    boot_id: Some(format!("{:08x}", snapshot.boot_id)),
+                    way: Way::Plc,
+                    from: from.to_string(),
+                    ..Change::of_command(action, subject)
+                };
+                if let Err(error) = record.add(&change) {
+                    progress.warn(&format!("record an order of the PLC: {error}: free space"));
+                }
+            }
+        })
+    }
+
     /// Serves the lines.
     pub fn lines(&self, wires: Wires) -> Room {
         let (station, progress) = (self.station.clone(), self.progress.clone());
@@ -86,7 +117,7 @@ impl Rooms<'_> {
         runtime: Runtime,
         plc: TcpListener,
         page: TcpListener,
-        access: Access,
+        (access, caller): (Access, &Caller),
     ) -> Room {
         let (config, station) = (self.config.clone(), self.station.clone());
         let (dating, boot_id) = (self.history.clone(), station.snapshot().boot_id);
@@ -111,6 +142,10 @@ impl Rooms<'_> {
             calibration_file: config.head.calibration.clone(),
             hosts: config.http.hosts.clone(),
             proxies: config.http.proxies.clone(),
+            looking_is_open: config.access.looking == Looking::Anyone,
+            collectors: config.access.collectors.clone(),
+            backups: Backups::of(self.path),
+            restart: caller.restart(),
         });
         let plc = PlcSide {
             listener: plc,
@@ -275,7 +310,7 @@ impl Daemon {
         let until = began + STOPPING;
         // Fails only if the measuring task has ended already.
         drop(self.orders.send(Order::Stop));
-        let [measuring, serving, surveying, wiring] = self.threads;
+        let [measuring, serving, surveying, wiring, recording] = self.threads;
         let join = |thread| join_while(thread, until, &self.progress, &|| true);
         // A thread that only computes may end with the program.
         join_while(measuring, began + MEASURING, &self.progress, &|| {
@@ -286,6 +321,9 @@ impl Daemon {
         let _ = self.sockets.send(true);
         join(serving);
         join(wiring);
+        // Behind what was ordered before. Where the queue is full the storage hangs.
+        let _ = self.ordered.try_send(None);
+        join(recording);
         drop(self.survey);
         join(surveying);
         // Last, so that the results of the others are stored.

@@ -3,32 +3,43 @@
 
 use super::control::BY_PART_NUMBER;
 use super::error_code;
-use super::event::{Effect, Effects, JobId, Teaching};
+use super::event::{Effect, Effects, JobId, PlcOrder, Teaching};
 use super::fault::LastFailure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::snapshot::reject;
 use super::state::{LoadProgress, State, TeachProgress};
+use super::triggers::Client;
 use std::sync::Arc;
+
+/// Has what the PLC ordered recorded.
+fn ordered(client: Client, order: PlcOrder, effects: &mut Effects) {
+    if let Some(from) = client.address() {
+        push(effects, Effect::Ordered { from, order });
+    }
+}
 
 impl Station {
     /// RECIPE_LOAD: a load that is refused counts as one that failed, because the PLC may trigger
     /// without looking at the answer.
-    pub(super) fn plc_load(&mut self, effects: &mut Effects) {
+    pub(super) fn plc_load(&mut self, client: Client, effects: &mut Effects) {
         let select = self.plc.registers.recipe_select;
         let key = match select {
             0 => return,
             BY_PART_NUMBER => RecipeKey::PartNumber(self.plc.registers.part_number_text().into()),
             number => RecipeKey::Number(number),
         };
-        if let Some(reason) = self.load(key, effects) {
-            self.recipes.refuse(select);
-            self.requests.reject(reason);
+        match self.load(key.clone(), effects) {
+            Some(reason) => {
+                self.recipes.refuse(select);
+                self.requests.reject(reason);
+            }
+            None => ordered(client, PlcOrder::Load(key), effects),
         }
     }
 
     /// TEACH.
-    pub(super) fn plc_teach(&mut self, effects: &mut Effects) {
+    pub(super) fn plc_teach(&mut self, client: Client, effects: &mut Effects) {
         let active = self.recipes.active.as_ref().map(|recipe| recipe.number);
         let reason = match (self.plc.registers.recipe_select, active) {
             _ if !self.settings.teach_allowed => Some(reject::TEACH_NOT_ALLOWED),
@@ -41,7 +52,18 @@ impl Station {
             }
             // The PLC chose the number; the recipe that had it stays as the previous generation.
             (0 | BY_PART_NUMBER, Some(number)) | (number, _) => {
-                self.teach(Teaching::of(number), effects)
+                let by = client
+                    .address()
+                    .map(|address| format!("PLC {address}").into());
+                let teaching = Teaching {
+                    by,
+                    ..Teaching::of(number)
+                };
+                let refused = self.teach(teaching, effects);
+                if refused.is_none() {
+                    ordered(client, PlcOrder::Teach(number), effects);
+                }
+                refused
             }
         };
         if let Some(reason) = reason {

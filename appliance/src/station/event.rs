@@ -1,5 +1,6 @@
 //! What reaches the station (events) and what it wants done (effects).
 
+use std::net::IpAddr;
 use std::sync::Arc;
 
 use super::clock::Micros;
@@ -44,6 +45,17 @@ pub struct Teaching {
     pub marking: Option<Marking>,
     /// The limit of the deviation, ± µm; as in the recipe that it replaces if it is not said.
     pub limit_um: Option<u32>,
+    /// Who ordered it, in words.
+    pub by: Option<Arc<str>>,
+}
+
+/// What a PLC ordered, and the station does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PlcOrder {
+    /// To load a recipe.
+    Load(RecipeKey),
+    /// To teach a recipe.
+    Teach(u16),
 }
 
 impl Teaching {
@@ -271,6 +283,13 @@ pub enum Effect {
     Commission {
         /// To quote.
         job: JobId,
+    },
+    /// Record what a PLC ordered.
+    Ordered {
+        /// Its address.
+        from: IpAddr,
+        /// What.
+        order: PlcOrder,
     },
     /// End the running job early; the station still waits for its answer.
     Abort {

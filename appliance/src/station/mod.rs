@@ -104,7 +104,9 @@ mod tests;
 pub use algo::inspect::Marking;
 pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
-pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Teaching, Unstored};
+pub use event::{
+    Condition, Effect, Effects, Event, Job, JobId, PlcOrder, Request, Teaching, Unstored,
+};
 pub use fault::Fault;
 pub use gauge::{COVERAGE_FACTOR, Decision, GaugeLimits, GaugeValue, Measured, Square, Unit};
 pub use handle::{StationHandle, tick};

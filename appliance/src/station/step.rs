@@ -152,10 +152,10 @@ impl Station {
             push(effects, Effect::Buffered(self.results.buffered));
         }
         if rose(control::RECIPE_LOAD) {
-            self.plc_load(effects);
+            self.plc_load(client, effects);
         }
         if rose(control::TEACH) {
-            self.plc_teach(effects);
+            self.plc_teach(client, effects);
         }
         let token = self.requests.new_token(write.token);
         if rose(control::TRIGGER) || token.is_some() {

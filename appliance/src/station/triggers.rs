@@ -8,6 +8,7 @@
 //! other client.
 
 use super::clock::Micros;
+use std::net::IpAddr;
 use std::sync::Arc;
 
 /// Who triggers.
@@ -18,14 +19,24 @@ pub enum Client {
     Line,
     /// A session of the page.
     Page(u64),
-    /// A connection of Modbus.
-    Plc(u64),
+    /// A connection of Modbus, by its number, and its address.
+    Plc(u64, IpAddr),
 }
 
 impl Client {
+    /// Where a PLC's connection comes from.
+    pub fn address(self) -> Option<IpAddr> {
+        match self {
+            Self::Plc(_, address) => Some(address),
+            Self::Line | Self::Page(_) => None,
+        }
+    }
+
     fn competes(self, other: Self) -> bool {
         match (self, other) {
-            (Self::Page(one), Self::Page(two)) | (Self::Plc(one), Self::Plc(two)) => one != two,
+            (Self::Page(one), Self::Page(two)) | (Self::Plc(one, _), Self::Plc(two, _)) => {
+                one != two
+            }
             _ => false,
         }
     }
@@ -158,8 +169,9 @@ impl Requests {
 mod tests {
     use super::*;
 
-    const FAST: Client = Client::Plc(1);
-    const SLOW: Client = Client::Plc(2);
+    const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+    const FAST: Client = Client::Plc(1, HERE);
+    const SLOW: Client = Client::Plc(2, HERE);
 
     fn at(ms: u64) -> Micros {
         Micros::from_millis(ms)

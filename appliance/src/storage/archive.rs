@@ -78,6 +78,8 @@ pub struct Members<R> {
     zip: ZipArchive<R>,
     /// Names in ascending order, each with its place in the directory.
     places: Vec<(String, usize)>,
+    /// Whether it has folders or links as well.
+    others: bool,
 }
 
 impl<R: Read + Seek> Members<R> {
@@ -114,7 +116,17 @@ impl<R: Read + Seek> Members<R> {
             }
         }
         places.sort();
-        Ok(Self { zip, places })
+        let others = places.len() != listed;
+        Ok(Self {
+            zip,
+            places,
+            others,
+        })
+    }
+
+    /// Whether it has members that are no files: folders or links.
+    pub fn has_others(&self) -> bool {
+        self.others
     }
 
     /// The names, ascending.
@@ -271,10 +283,19 @@ fn is_inside(name: &str) -> bool {
 
 /// A temporary folder that other users cannot read; it is removed when this is dropped.
 #[derive(Debug)]
-struct Scratch(PathBuf);
+pub struct Scratch(PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Self> {
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// A new one.
+    ///
+    /// # Errors
+    /// If it cannot be created (73).
+    pub fn new() -> Result<Self> {
         let name = format!("fringed-{:08x}", crate::storage::state::random()?);
         let folder = std::env::temp_dir().join(name);
         let failed = Exit::CannotCreate.because(format!("create {}", folder.display()));

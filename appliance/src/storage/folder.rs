@@ -1,6 +1,7 @@
 //! Files that a loss of power leaves whole, and a folder of them.
 
 use crate::error::{Exit, Result};
+use crate::station::FULL_STORAGE_MIB;
 use rustix::fs::OFlags;
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -162,6 +163,22 @@ pub fn name_also(file: &Path, second: &Path) -> io::Result<()> {
     let _ = fs::remove_file(&temporary);
     // Not every file system gives a file two names.
     named.or_else(|_| copy_whole(file, second))
+}
+
+/// Checks that `more` bytes beside this file leave as much free storage as the station needs.
+///
+/// # Errors
+/// `StorageFull` if not, or whatever the file system answers.
+pub fn check_room(file: &fs::File, more: u64) -> io::Result<()> {
+    let storage = rustix::fs::fstatvfs(file)?;
+    let free = storage.f_bavail.saturating_mul(storage.f_frsize);
+    let needed = (FULL_STORAGE_MIB << 20).saturating_add(more);
+    if free >= needed {
+        return Ok(());
+    }
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let words = format!("{} MiB are free, {} are needed", mib(free), mib(needed));
+    Err(io::Error::new(io::ErrorKind::StorageFull, words))
 }
 
 /// Syncs the folder that a file lies in, so that its name is there after a loss of power, or gone.

@@ -3,7 +3,8 @@
 use crate::error::{Exit, Failure, Result};
 use crate::storage::folder::{read_whole, write_whole};
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::Write as _;
+use std::io::ErrorKind;
+use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -15,11 +16,11 @@ pub struct StateFolder {
     _lock: File,
 }
 
-/// The counter's file: the last SEQ that may be in use, in decimal, and the run that wrote it, in
-/// hexadecimal.
+/// The counter's file: the last SEQ that may be in use, in decimal, the run that wrote it, in
+/// hexadecimal, and where the record of changes ends.
 const COUNTER: &str = "result-seq";
 /// The serial's file.
-const SERIAL: &str = "serial";
+pub const SERIAL: &str = "serial";
 /// Longest of these files, bytes.
 const MOST: u64 = 4096;
 
@@ -97,27 +98,19 @@ impl StateFolder {
     /// # Errors
     /// It cannot be read or is damaged. Guessing would let a SEQ be used twice.
     pub fn counted(&self) -> Result<Counted, CounterError> {
-        let file = self.path.join(COUNTER);
-        let bytes = match read_whole(&file, MOST) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return Ok(Counted::default());
-            }
-            Err(source) => return Err(CounterError::Read { file, source }),
-        };
-        let text = String::from_utf8_lossy(&bytes);
-        let made = File::open(&file).map_or(0, |file| made(&file));
-        Counted::read(&text, made).ok_or_else(|| {
-            let begin = text.trim().chars().take(40).collect();
-            CounterError::Damaged { file, begin }
-        })
+        Counted::in_folder(&self.path)
     }
 
     /// A writer of the counter.
     pub fn counter(&self) -> Counter {
-        Counter {
-            file: self.path.join(COUNTER),
-        }
+        Counter::of(&self.path)
+    }
+
+    /// The serial in a folder, which a station may use; `None` before its first start.
+    pub fn serial_in(folder: &Path) -> Option<String> {
+        let serial = read_whole(&folder.join(SERIAL), MOST).ok()?;
+        let serial = String::from_utf8(serial).ok()?.trim().to_owned();
+        (!serial.is_empty()).then_some(serial)
     }
 
     /// The device's serial, made at the first start.
@@ -125,13 +118,10 @@ impl StateFolder {
     /// # Errors
     /// If it can neither be read nor written.
     pub fn serial(&self) -> Result<String> {
-        let file = self.path.join(SERIAL);
-        if let Ok(serial) = read_whole(&file, MOST)
-            && let Ok(serial) = String::from_utf8(serial)
-            && !serial.trim().is_empty()
-        {
-            return Ok(serial.trim().to_owned());
+        if let Some(serial) = Self::serial_in(&self.path) {
+            return Ok(serial);
         }
+        let file = self.path.join(SERIAL);
         let serial = format!("{:08X}", random()?);
         write_whole(&file, format!("{serial}\n").as_bytes())
             .map_err(Exit::CannotCreate.because(format!("write {}", file.display())))?;
@@ -175,6 +165,25 @@ pub struct Counted {
 }
 
 impl Counted {
+    /// What the counter's file of a folder says; see [`StateFolder::counted`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn in_folder(folder: &Path) -> Result<Self, CounterError> {
+        let file = folder.join(COUNTER);
+        let bytes = match read_whole(&file, MOST) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self::default()),
+            Err(source) => return Err(CounterError::Read { file, source }),
+        };
+        let text = String::from_utf8_lossy(&bytes);
+        let made = File::open(&file).map_or(0, |file| made(&file));
+        Self::read(&text, made).ok_or_else(|| {
+            let begin = text.trim().chars().take(40).collect();
+            CounterError::Damaged { file, begin }
+        })
+    }
+
     /// Reads the content of the counter's file, which was made at `made`: ns since 1970,
     /// 0 where that is not known.
     pub fn read(text: &str, made: u64) -> Option<Self> {
@@ -187,7 +196,9 @@ impl Counted {
             None | Some("-") => None,
             Some(seq) => Some(seq.parse().ok()?),
         };
-        words.next().is_none().then_some(Self {
+        let rest = words.next();
+        let ends = rest.is_none() || RecordEnd::read(text).is_some();
+        ends.then_some(Self {
             last,
             run: run.unwrap_or(Some(0))?,
             buffered,
@@ -195,12 +206,42 @@ impl Counted {
         })
     }
 
-    /// The content of a counter's file that was made at `made`. Its length is always the same, so
+    /// What a counter's file that was made at `made` begins with. Its length is always the same, so
     /// that overwriting it needs no room.
     pub fn text(self, made: u64) -> String {
         let buffered = self.buffered.map_or("-".into(), |seq| seq.to_string());
         let Self { last, run, .. } = self;
-        format!("{last:010} {run:08x} {made:016x} {buffered:>10}\n")
+        format!("{last:010} {run:08x} {made:016x} {buffered:>10}")
+    }
+}
+
+/// Bytes of [`Counted::text`].
+const COUNTED: usize = 47;
+
+/// Where the record of changes ends, as the counter's file says.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordEnd {
+    /// The number of the last line; 0 if there is none.
+    pub number: u32,
+    /// Its SHA-256, 64 hexadecimal digits.
+    pub hash: String,
+}
+
+impl RecordEnd {
+    /// Reads the fifth and sixth word of the counter's file.
+    fn read(text: &str) -> Option<Self> {
+        let mut words = text.split_whitespace().skip(4);
+        let (number, hash) = (words.next()?.parse().ok()?, words.next()?);
+        let is_hash = hash.len() == 64 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
+        (is_hash && words.next().is_none()).then(|| Self {
+            number,
+            hash: hash.to_owned(),
+        })
+    }
+
+    /// What follows [`Counted::text`], always as long.
+    fn text(&self) -> String {
+        format!(" {:010} {}\n", self.number, self.hash)
     }
 }
 
@@ -218,6 +259,13 @@ pub struct Counter {
 }
 
 impl Counter {
+    /// That of a state folder.
+    pub fn of(state: &Path) -> Self {
+        Self {
+            file: state.join(COUNTER),
+        }
+    }
+
     /// Puts a file that cannot be used beside the one that is written next.
     pub fn put_aside(&self) {
         // Where it cannot be renamed it is replaced.
@@ -230,17 +278,58 @@ impl Counter {
     /// # Errors
     /// Whatever the file system answers.
     pub fn store(&self, counted: Counted) -> std::io::Result<()> {
-        let open = || OpenOptions::new().write(true).open(&self.file);
-        let mut file = match open() {
-            Ok(file) if file.metadata()?.len() == counted.text(0).len() as u64 => file,
+        let file = match self.open()? {
+            Some(file) => file,
             // The first time, or a file that a person wrote.
-            _ => {
-                write_whole(&self.file, counted.text(0).as_bytes())?;
-                open()?
+            None => {
+                let end = self.record_end().map_or("\n".into(), |end| end.text());
+                write_whole(&self.file, (counted.text(0) + &end).as_bytes())?;
+                OpenOptions::new().write(true).open(&self.file)?
             }
         };
-        file.write_all(counted.text(made(&file)).as_bytes())?;
+        file.write_all_at(counted.text(made(&file)).as_bytes(), 0)?;
         file.sync_data()
+    }
+
+    /// Where the record of changes ends; `None` where the file does not say so.
+    pub fn record_end(&self) -> Option<RecordEnd> {
+        let bytes = read_whole(&self.file, MOST).ok()?;
+        RecordEnd::read(&String::from_utf8_lossy(&bytes))
+    }
+
+    /// Stores where the record of changes ends, beside the numbers of results, which stay as they
+    /// are: both are written in place by different threads or processes.
+    ///
+    /// # Errors
+    /// Whatever the file system answers; `InvalidData` if the file is damaged.
+    pub fn store_end(&self, end: &RecordEnd) -> std::io::Result<()> {
+        let file = match self.open()? {
+            Some(file) => file,
+            None => {
+                let text = match read_whole(&self.file, MOST) {
+                    Err(error) if error.kind() == ErrorKind::NotFound => b"0".to_vec(),
+                    read => read?,
+                };
+                let counted = Counted::read(&String::from_utf8_lossy(&text), 0);
+                self.store(counted.ok_or(ErrorKind::InvalidData)?)?;
+                OpenOptions::new().write(true).open(&self.file)?
+            }
+        };
+        file.write_all_at(end.text().as_bytes(), COUNTED as u64)?;
+        file.sync_data()
+    }
+
+    /// The file, to be written in place; `None` if it is not there or has another length.
+    fn open(&self) -> std::io::Result<Option<File>> {
+        let Ok(file) = OpenOptions::new().write(true).open(&self.file) else {
+            return Ok(None);
+        };
+        let length = file.metadata()?.len() as usize;
+        let lengths = [
+            COUNTED + 1,
+            COUNTED + RecordEnd::default().text().len() + 64,
+        ];
+        Ok(lengths.contains(&length).then_some(file))
     }
 }
 

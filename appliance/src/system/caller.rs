@@ -131,7 +131,21 @@ fn millis(time: Duration) -> u64 {
 
 /// Whether the signal has arrived; the default value never gets one. Cheap to clone.
 #[derive(Clone, Debug, Default)]
-pub struct StopSignal(Option<watch::Receiver<bool>>);
+pub struct StopSignal(
+    Option<watch::Receiver<bool>>,
+    Option<Arc<watch::Sender<bool>>>,
+);
+
+impl Caller {
+    /// Ends the program as the stop signal does, where a service manager starts it anew.
+    pub fn restart(&self) -> Option<Box<dyn Fn() + Send + Sync>> {
+        let stop = self.stop.1.clone().filter(|_| self.notify.is_connected())?;
+        // All receivers are gone only where the program ends anyway.
+        Some(Box::new(move || {
+            let _ = stop.send(true);
+        }))
+    }
+}
 
 impl StopSignal {
     /// Catches the signals from now on.
@@ -148,6 +162,8 @@ impl StopSignal {
         let mut interrupt = listen(SignalKind::interrupt())?;
         let mut terminate = listen(SignalKind::terminate())?;
         let (arrive, arrived) = watch::channel(false);
+        let arrive = Arc::new(arrive);
+        let signalled = arrive.clone();
         let wait = move || {
             runtime.block_on(async {
                 tokio::select! {
@@ -156,13 +172,13 @@ impl StopSignal {
                 }
             });
             // All receivers are gone only where the program ends anyway.
-            let _ = arrive.send(true);
+            let _ = signalled.send(true);
         };
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(wait)
             .map_err(&failed)?;
-        Ok(Self(Some(arrived)))
+        Ok(Self(Some(arrived), Some(arrive)))
     }
 
     /// Whether it has arrived.

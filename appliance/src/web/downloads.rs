@@ -12,6 +12,7 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::sync::mpsc::{self, error::TrySendError};
+use tokio::sync::oneshot;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use zip::ZipWriter;
@@ -21,6 +22,7 @@ use super::problem::{Answered, Problem};
 use super::request::Query;
 use super::site::Site;
 use super::{metrics, view};
+use crate::access::record::RecordFilter;
 use crate::history::{Filter, JudgedPart, name_of};
 use crate::output::cloud::Pixels;
 use crate::output::npz::OrganisedMaps;
@@ -29,7 +31,10 @@ use crate::storage::archive::{packed, stored};
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
 /// The same of maps, which have tens of megabytes.
-const LARGE_CHUNK: usize = 1 << 20;
+pub(super) const LARGE_CHUNK: usize = 1 << 20;
+
+/// Lines of the record of changes in the diagnostic bundle.
+const MOST_CHANGES: usize = 1000;
 
 /// What is sent.
 pub(super) enum Download {
@@ -151,7 +156,7 @@ pub(super) struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
     /// Bytes of a chunk.
-    most: usize,
+    pub(super) most: usize,
     /// Whether all of the answer was sent.
     whole: Arc<AtomicBool>,
     /// Longest wait for the client to take a chunk.
@@ -219,6 +224,25 @@ impl io::Write for ToClient {
             std::thread::sleep(LOOK);
         }
     }
+}
+
+/// Has a thread of its own make an answer and send it, as its priority is changed for good. The thread
+/// says when the answer begins, or why there is none.
+///
+/// # Errors
+/// What the thread says; `failed`, where there is no thread or it panics.
+pub(super) async fn sent_alone(
+    name: &str,
+    failed: &str,
+    work: impl FnOnce(ToClient, oneshot::Sender<Answered<()>>) + Send + 'static,
+) -> Answered<Body> {
+    let (to, body) = ToClient::new();
+    let (begun, beginning) = oneshot::channel();
+    let thread = std::thread::Builder::new().name(name.into());
+    let spawned = thread.spawn(move || work(to, begun));
+    spawned.map_err(|_| Problem::broken(failed))?;
+    beginning.await.map_err(|_| Problem::broken(failed))??;
+    Ok(body)
 }
 
 /// Which pixels of the part are sent.
@@ -339,7 +363,14 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         .collect();
     let results = site.history.results(&Filter::default());
     let results = results.map_or_else(|error| json!(error.to_string()), |results| json!(results));
-    let changes = site.access.changes().latest().unwrap_or_default();
+    let changes = site
+        .access
+        .record()
+        .list(&RecordFilter {
+            limit: Some(MOST_CHANGES),
+            ..RecordFilter::default()
+        })
+        .unwrap_or_default();
     let members = [
         ("snapshot.json", text(&view::snapshot(&snapshot))),
         ("registers.json", text(&(site.registers)(&snapshot))),

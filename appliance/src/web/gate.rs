@@ -1,51 +1,83 @@
-//! The gate: checks the Host header of every request, and origin and session of every change, whose
-//! outcome it records; opens and ends sessions.
+//! The gate: checks the Host header of every request, the role that its row in the table of routes
+//! needs, and the origin of every change, whose outcome it records.
 //!
 //! Another site can let its own name resolve to this device (DNS rebinding) and then read it through
 //! its visitor's browser. It cannot forge the Host header, so only IP addresses, `localhost` and
 //! configured names are answered.
 
 use super::problem::{Answered, Problem, ProblemWords};
-use super::request;
 use super::site::Site;
-use crate::station::Micros;
-use crate::station::snapshot::warning;
+use crate::access::record::recipe_of;
+use crate::access::{Access, Change, Role, Signed, Way};
 use crate::system::clock;
 use crate::system::journal::{self, Severity};
-use crate::web::access::{Change, MAX_AGE_S, Refused, Token};
+use crate::system::socket::holds;
 use axum::Extension;
-use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use axum::middleware::Next;
-use axum::response::{IntoResponse, Json, Response};
-use serde::Deserialize;
-use serde_json::{Value, json};
+use axum::response::{IntoResponse, Response};
 use std::net::{IpAddr, Ipv6Addr};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// The session's cookie.
-const COOKIE: &str = "fringed-session";
+pub(super) const COOKIE: &str = "fringed-session";
+/// Refused changes of those who have not signed in are recorded so often at most, s: nobody can have
+/// the record drop its lines.
+const STRANGERS_EVERY_S: u32 = 10;
 
 /// The client's address, added to each request by the server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer(pub IpAddr);
 
-/// The name of a change in the record.
+/// Who may make a request, at least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Least {
+    /// Everybody, whatever the configuration says: to sign in.
+    Anyone,
+    /// As a viewer, and programs at the configured addresses.
+    Collector,
+    /// A user with this role or more; without signing in everybody is a viewer, unless the
+    /// configuration says otherwise.
+    User(Role),
+}
+
+/// What a row of the table of routes asks for.
 #[derive(Clone, Copy, Debug)]
-pub struct ChangeName(pub &'static str);
+pub struct Rule {
+    /// Who may.
+    pub least: Least,
+    /// The name of the change in the record; none if nothing is changed.
+    pub changes: Option<&'static str>,
+}
 
-/// What a change has changed, in words: an extension of the answer, for the record.
+/// What a change has changed: an extension of the answer, for the record.
+#[derive(Clone, Debug, Default)]
+pub struct Changed {
+    /// In words.
+    pub words: String,
+    /// The recipe, and the fingerprint of the version that came of it.
+    pub recipe: Option<(u16, String)>,
+}
+
+/// What a request with a body may do once its body has come: an extension of the request.
 #[derive(Clone, Debug)]
-pub struct Changed(pub String);
+pub(super) struct Permit {
+    access: Access,
+    token: String,
+    rule: Rule,
+}
 
-/// The body of a sign-in.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SignIn {
-    secret: String,
-    /// The time by the browser's clock, ms since 1970 UTC.
-    time_ms: Option<u64>,
+impl Permit {
+    /// Checks that its sender still has the role.
+    ///
+    /// # Errors
+    /// It was taken away while the body came.
+    pub fn check(&self) -> Answered<()> {
+        let signed = self.access.signed_in(&self.token, Instant::now());
+        refusal(self.rule, signed.as_ref(), None).map_or(Ok(()), Err)
+    }
 }
 
 /// Checks that a request names one host, and that this is the device.
@@ -115,28 +147,47 @@ pub fn token(headers: &HeaderMap) -> Option<&str> {
         .map(|(_, value)| value)
 }
 
-/// Whether a request belongs to an open session.
-pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
-    token(headers).is_some_and(|token| site.access.is_signed_in(token, Instant::now()))
+/// Who has made a request.
+pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Option<Signed> {
+    site.access.signed_in(token(headers)?, Instant::now())
 }
 
-/// Refuses a request without a session.
-///
-/// # Errors
-/// How to sign in.
-pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Answered<()> {
-    let words = "sign in first: POST the device's secret to /api/session";
-    let refused = || Problem::new(StatusCode::UNAUTHORIZED, words);
-    is_signed_in(site, headers)
-        .then_some(())
-        .ok_or_else(refused)
+/// Why a request is refused; `guest` is what somebody may do who has not signed in.
+fn refusal(rule: Rule, signed: Option<&Signed>, guest: Option<Least>) -> Option<Problem> {
+    let role = match rule.least {
+        Least::Anyone => return None,
+        Least::Collector if guest == Some(Least::Collector) => return None,
+        Least::Collector => Role::Viewer,
+        Least::User(role) => role,
+    };
+    let open = guest == Some(Least::User(Role::Viewer)) && role == Role::Viewer;
+    match signed {
+        _ if open => None,
+        None => {
+            let words = "sign in first: POST a user's name and password, or the device's secret, to /api/session";
+            Some(Problem::new(StatusCode::UNAUTHORIZED, words))
+        }
+        Some(signed) if signed.role >= role => None,
+        Some(Signed { name, role: own }) => {
+            let what = rule
+                .changes
+                .map_or(String::new(), |what| format!("{what}: "));
+            let (is, needed) = (own.with_article(), role.or_more());
+            let words = format!("{what}{name} is {is}, and this needs {needed}");
+            Some(Problem::new(StatusCode::FORBIDDEN, words).with("role", role.word()))
+        }
+    }
 }
 
-/// The cookie that holds a session's token, or without one the cookie that deletes it.
-pub fn cookie(token: Option<&Token>) -> Option<HeaderValue> {
-    let (value, age) = token.map_or(("", 0), |token| (token.text(), MAX_AGE_S));
-    let text = format!("{COOKIE}={value}; Path=/; HttpOnly; SameSite=Strict; Max-Age={age}");
-    HeaderValue::from_str(&text).ok()
+/// What somebody at this address may do without signing in.
+fn guest(site: &Site, from: IpAddr) -> Option<Least> {
+    // A proxy stands for anybody.
+    let collects = holds(&site.collectors, from) && !holds(&site.proxies, from);
+    match (site.looking_is_open, collects) {
+        (true, _) => Some(Least::User(Role::Viewer)),
+        (false, true) => Some(Least::Collector),
+        (false, false) => None,
+    }
 }
 
 /// Lets a request through only if it comes from this device's own page. The browser sets the Origin
@@ -155,53 +206,94 @@ fn is_own(headers: &HeaderMap) -> bool {
     origin.is_some_and(|(_, place)| Some(place) == only(headers, &header::HOST))
 }
 
-/// Lets a request through only with an open session, and records its outcome.
-pub async fn signed_in_only(
+/// Lets a request through only for those who may, and records its outcome if it is a change.
+pub async fn allowed_only(
     site: Site,
     Extension(Peer(from)): Extension<Peer>,
-    Extension(ChangeName(action)): Extension<ChangeName>,
-    request: Request,
+    Extension(rule): Extension<Rule>,
+    mut request: Request,
     next: Next,
 ) -> Response {
     let subject = request.uri().path().trim_start_matches("/api/").to_owned();
-    let response = match signed_in(&site, request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(problem) => problem.into_response(),
+    let token = token(request.headers()).map(str::to_owned);
+    let signed = signed_in(&site, request.headers());
+    let response = match refusal(rule, signed.as_ref(), guest(&site, from)) {
+        Some(problem) => problem.into_response(),
+        None => {
+            if let (Some(_), Some(token)) = (&signed, token) {
+                let access = site.access.clone();
+                request.extensions_mut().insert(Permit {
+                    access,
+                    token,
+                    rule,
+                });
+            }
+            if let Some(signed) = &signed {
+                request.extensions_mut().insert(signed.clone());
+            }
+            next.run(request).await
+        }
+    };
+    let Some(action) = rule.changes else {
+        return response;
     };
     let refused = response.extensions().get::<ProblemWords>().cloned();
+    if signed.is_none() && !is_due(&site) {
+        return response;
+    }
     let changed = response.extensions().get::<Changed>().cloned();
-    record(&site, from, action, subject, refused, changed).await;
+    record(&site, from, signed, action, subject, refused, changed).await;
     response
+}
+
+/// Whether another refusal of a stranger is recorded.
+fn is_due(site: &Site) -> bool {
+    // From 1 on, as 0 is what nothing was recorded at.
+    let now_s = site.station.snapshot().uptime_s.saturating_add(1);
+    let last_s = site.stranger_at_s.load(Ordering::Relaxed);
+    let due = last_s == 0 || now_s >= last_s + STRANGERS_EVERY_S;
+    if due {
+        site.stranger_at_s.store(now_s, Ordering::Relaxed);
+    }
+    due
 }
 
 /// Adds a line to the record of changes: why the change was `refused`, else that it was done and what
 /// was `changed`, where that is known. If that fails, the log says so.
-async fn record(
+pub(super) async fn record(
     site: &Site,
     from: IpAddr,
+    signed: Option<Signed>,
     action: &'static str,
     subject: String,
     refused: Option<ProblemWords>,
     changed: Option<Changed>,
 ) {
-    let written = site
-        .change(move |site| {
-            let snapshot = site.station.snapshot();
-            let change = Change {
-                utc_us: clock::utc_us(),
-                uptime_s: snapshot.uptime_s,
-                boot_id: snapshot.boot_id,
-                from,
-                action,
-                subject: &subject,
-                outcome: refused.as_ref().map_or("done", |ProblemWords(words)| words),
-                changed: changed.as_ref().map(|Changed(words)| words.as_str()),
-            };
-            let stored = site.access.changes().add(&change);
-            stored.map_err(Problem::broken)
-        })
-        .await;
-    if let Err(problem) = written {
+    let snapshot = site.station.snapshot();
+    let (user, role) = signed.map(|signed| (signed.name, signed.role)).unzip();
+    let words = changed.as_ref().map(|changed| changed.words.clone());
+    let made = changed.and_then(|changed| changed.recipe);
+    let change = Change {
+        utc_us: clock::utc_us(),
+        uptime_s: Some(snapshot.uptime_s),
+        boot_id: Some(format!("{:08x}", snapshot.boot_id)),
+        way: Way::Page,
+        from: from.to_string(),
+        user,
+        role,
+        action: action.into(),
+        recipe: made
+            .as_ref()
+            .map(|made| made.0)
+            .or_else(|| recipe_of(&subject)),
+        subject,
+        outcome: refused.map_or_else(|| "done".into(), |ProblemWords(words)| words),
+        changed: words.filter(|words| !words.is_empty()),
+        fingerprint: made.map(|made| made.1),
+    };
+    let stored =
+        site.change(move |site| site.access.record().add(&change).map_err(Problem::broken));
+    if let Err(problem) = stored.await {
         let line = format!(
             "record the change {action:?}: {}: free space",
             problem.words
@@ -209,85 +301,6 @@ async fn record(
         journal::write(Severity::Warning, &line);
         site.log.add(&line);
     }
-}
-
-pub(super) async fn session(site: Site, headers: HeaderMap) -> Json<Value> {
-    Json(json!({ "signed_in": is_signed_in(&site, &headers) }))
-}
-
-pub(super) async fn begin_session(
-    site: Site,
-    Extension(Peer(from)): Extension<Peer>,
-    request: Request<Body>,
-) -> Answered<Response> {
-    let SignIn { secret, time_ms } = request::json(request.into_body()).await?;
-    let received = site.station.now();
-    let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
-    let token = guess.await?;
-    // A guess that has to wait is not recorded, so that guessing cannot fill the record.
-    if !matches!(token, Err(Refused::Wait(_))) {
-        let refused = token.as_ref().err();
-        let refused = refused.map(|refused| ProblemWords(refused.to_string()));
-        record(&site, from, "sign in", "session".into(), refused, None).await;
-    }
-    match token {
-        Ok(token) => {
-            let time = match time_ms {
-                Some(ms) => {
-                    let dated = site.change(move |site| Ok(date(site, ms, received)));
-                    Some(dated.await?)
-                }
-                None => None,
-            };
-            let answer = json!({ "signed_in": true, "time": time });
-            Ok(with_cookie(cookie(Some(&token)), answer))
-        }
-        Err(refused) => {
-            let status = match &refused {
-                Refused::Wrong => StatusCode::FORBIDDEN,
-                Refused::Wait(_) => StatusCode::TOO_MANY_REQUESTS,
-                Refused::Broken(_) => StatusCode::INTERNAL_SERVER_ERROR,
-            };
-            let mut response = Problem::new(status, &refused).into_response();
-            if let Refused::Wait(time) = refused {
-                let seconds = HeaderValue::from(time.as_secs().max(1));
-                response.headers_mut().insert(header::RETRY_AFTER, seconds);
-            }
-            Ok(response)
-        }
-    }
-}
-
-pub(super) async fn end_session(site: Site, headers: HeaderMap) -> Response {
-    if let Some(token) = token(&headers) {
-        site.access.sign_out(token);
-    }
-    with_cookie(cookie(None), json!({ "signed_in": false }))
-}
-
-/// Dates this start by the clock of a browser whose user has signed in, where the device's own
-/// clock is not synchronised; answers with the outcome. The last sign-in counts, so a wrong time is
-/// corrected by signing in from a browser with the right one.
-fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
-    if site.station.snapshot().warnings & warning::CLOCK_UNSYNCED == 0 {
-        return "not needed";
-    }
-    let Some(us) = clock::of_browser(ms) else {
-        return "refused";
-    };
-    clock::tell(us);
-    match (site.date)(us.saturating_sub(received.0)) {
-        true => "taken",
-        false => "not stored",
-    }
-}
-
-fn with_cookie(cookie: Option<HeaderValue>, answer: Value) -> Response {
-    let mut response = Json(answer).into_response();
-    if let Some(cookie) = cookie {
-        response.headers_mut().insert(header::SET_COOKIE, cookie);
-    }
-    response
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! The head: its commissioning step by step, the board to print for it, the live picture, and the part
 //! in front of a simulated one.
 
-use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Answered, Problem};
 use super::request::{self, Path, Query};
@@ -17,9 +16,8 @@ use crate::production::commissioning::StepRequest;
 use crate::production::simulation::PutError;
 use crate::station::{Event, Request as Command};
 use crate::system::computing;
-use axum::body::Body;
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 use serde_json::Value;
@@ -62,7 +60,7 @@ pub(super) async fn step(
     Path(name): Path<String>,
     request: Request,
 ) -> Answered<Accepted> {
-    let asked = asked(&site, &name, request.into_body()).await?;
+    let asked = asked(&site, &name, request).await?;
     if site.simulation.is_placing() {
         return Err(Problem::busy(format!(
             "commission the head, step {name}: another part is being put in front of the simulated head: try again when it is there"
@@ -88,7 +86,7 @@ pub(super) async fn end(site: Site, Path(name): Path<String>) -> Answered<Accept
     Ok(accepted())
 }
 
-async fn asked(site: &Site, name: &str, body: Body) -> Answered<StepRequest> {
+async fn asked(site: &Site, name: &str, request: Request) -> Answered<StepRequest> {
     let step = Step::of(name).ok_or_else(|| {
         let [before @ .., last] = STEPS.each_ref().map(|step| step.name);
         let before = before.join(", ");
@@ -96,12 +94,12 @@ async fn asked(site: &Site, name: &str, body: Body) -> Answered<StepRequest> {
     })?;
     let (mut poses, mut exposing) = (None, None);
     match step.name {
-        EXPOSURE => exposing = exposure(site, request::json_if_any(body).await?)?,
+        EXPOSURE => exposing = exposure(site, request::json_if_any(request).await?)?,
         GEOMETRY => {
-            poses = Some(geometry(site, request::json(body).await?)?);
+            poses = Some(geometry(site, request::json(request).await?)?);
         }
         _ => {
-            let Nothing {} = request::json_if_any(body).await?;
+            let Nothing {} = request::json_if_any(request).await?;
         }
     }
     Ok(StepRequest {
@@ -163,12 +161,7 @@ pub(super) struct LiveQuery {
     show: String,
 }
 
-pub(super) async fn live(
-    site: Site,
-    headers: HeaderMap,
-    Query(shown): Query<LiveQuery>,
-) -> Answered<Response> {
-    signed_in(&site, &headers)?;
+pub(super) async fn live(site: Site, Query(shown): Query<LiveQuery>) -> Answered<Response> {
     let Some(show) = Show::parse(&shown.show) else {
         let words = Show::ALL.map(Show::word).join(", ");
         return Err(Problem::unclear(format!("show: write one of {words}")));
@@ -191,8 +184,7 @@ pub(super) async fn live(
     Ok(response)
 }
 
-pub(super) async fn figures(site: Site, headers: HeaderMap) -> Answered<Json<Value>> {
-    signed_in(&site, &headers)?;
+pub(super) async fn figures(site: Site) -> Answered<Json<Value>> {
     let words = "no live picture was taken yet: ask for one first";
     site.live
         .figures()
@@ -245,8 +237,8 @@ pub(super) async fn part(site: Site) -> Json<Value> {
 }
 
 /// Answers once the next cycle sees the part.
-pub(super) async fn put_part(site: Site, body: Body) -> Answered<Json<Value>> {
-    let placed: Placed = request::json(body).await?;
+pub(super) async fn put_part(site: Site, request: Request) -> Answered<Json<Value>> {
+    let placed: Placed = request::json(request).await?;
     let simulation = site.simulation.clone();
     let failed = "putting the part in place failed; see the log";
     alone("staging", failed, move || simulation.put(&placed)).await??;

@@ -240,7 +240,7 @@ pub(super) async fn log(site: Site) -> Answered<Json<Value>> {
 
 /// Adds to lines without a time the time by a browser's clock, if the start of their `boot_id`, or
 /// this one, was dated by one.
-fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
+pub(super) fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
     // The times of starts are in the history.
     let starts = site.history.starts().unwrap_or_default();
     let this = format!("{:08x}", site.station.snapshot().boot_id);
@@ -251,16 +251,4 @@ fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
         }
     }
     lines
-}
-
-pub(super) async fn changes(site: Site) -> Answered<Json<Value>> {
-    let lines = site
-        .aside(|site| {
-            let read = site.access.changes().latest();
-            let read = read
-                .map_err(|error| Problem::broken(format!("read the record of changes: {error}")))?;
-            Ok(dated(site, read))
-        })
-        .await?;
-    Ok(Json(json!({ "changes": lines })))
 }

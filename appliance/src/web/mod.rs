@@ -2,11 +2,10 @@
 //! changed.
 //!
 //! [`server`] has the table of all paths, described in `openapi.json`, and listens; [`slots`] limits its
-//! connections. Reading needs no login; every change passes the gate (`gate.rs`): Origin, session,
-//! record of changes. It also refuses requests for another host name. [`view`] is the snapshot as
+//! connections. Every request passes the gate (`gate.rs`): the role that its row needs, and of a change
+//! its Origin and the record of changes. It also refuses requests for another host name. [`view`] is the snapshot as
 //! JSON and as server-sent events. The files of the page are in `assets/` and compiled in.
 
-pub mod access;
 pub mod assets;
 pub mod look;
 pub mod map;
@@ -15,6 +14,8 @@ pub mod server;
 pub mod slots;
 pub mod view;
 
+mod backup;
+mod changes;
 mod desk;
 mod downloads;
 mod gate;
@@ -26,11 +27,13 @@ mod orders;
 mod recipes;
 mod request;
 mod results;
+mod session;
 mod site;
 mod statistics;
 mod studies;
 mod tries;
 mod triggers;
+mod users;
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use axum::Extension;
 use axum::body::Body;
 use axum::extract::Request as Asked;
 use axum::http::StatusCode;
@@ -13,6 +14,7 @@ use super::problem::{Answered, Problem};
 use super::request;
 use super::request::Path;
 use super::site::Site;
+use crate::access::Signed;
 use crate::recipe::file::rules::check_marking;
 use crate::recipe::store;
 use crate::recipe::teach::replace;
@@ -138,6 +140,7 @@ struct TeachRequest {
 pub(super) async fn teach(
     site: Site,
     Path(number): Path<u16>,
+    Extension(signed): Extension<Signed>,
     request: Asked<Body>,
 ) -> Answered<Accepted> {
     if !(1..=MAX_RECIPE).contains(&number) {
@@ -161,7 +164,7 @@ pub(super) async fn teach(
         everything,
         marking,
         limit_mm,
-    } = request::json_if_any(request.into_body()).await?;
+    } = request::json_if_any(request).await?;
     let limit = replace::check_limit(limit_mm);
     let marked = marking.as_ref().map_or(Ok(()), check_marking);
     let fits = limit.and(marked);
@@ -198,6 +201,7 @@ pub(super) async fn teach(
         everything,
         marking,
         limit_um: limit_mm.map(|mm| (mm * 1000.0).round() as u32),
+        by: Some(signed.to_string().into()),
     });
     let after = site.station.event(Event::Request(order));
     if after.state_word == "teaching" {

@@ -7,7 +7,7 @@ use std::fmt::Display;
 use std::io::{self, ErrorKind};
 
 /// Seconds in Retry-After, where too many requests are being answered.
-const RETRY_AFTER_S: &str = "5";
+const RETRY_AFTER_S: u64 = 5;
 
 /// An error that the client gets.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +18,8 @@ pub struct Problem {
     pub words: String,
     /// What programs need beside the words, by its key.
     pub more: Vec<(&'static str, Value)>,
+    /// After how many seconds the same request may be answered.
+    pub after_s: Option<u64>,
 }
 
 impl Problem {
@@ -27,7 +29,15 @@ impl Problem {
             status,
             words: words.to_string(),
             more: Vec::new(),
+            after_s: (status == StatusCode::SERVICE_UNAVAILABLE).then_some(RETRY_AFTER_S),
         }
+    }
+
+    /// The same, to be tried again after some seconds.
+    #[must_use]
+    pub fn after(mut self, seconds: u64) -> Self {
+        self.after_s = Some(seconds);
+        self
     }
 
     /// The same with something that programs need.
@@ -80,9 +90,9 @@ impl IntoResponse for Problem {
             body[key] = value;
         }
         let mut response = (self.status, Json(body)).into_response();
-        if self.status == StatusCode::SERVICE_UNAVAILABLE {
-            let soon = HeaderValue::from_static(RETRY_AFTER_S);
-            response.headers_mut().insert(header::RETRY_AFTER, soon);
+        if let Some(seconds) = self.after_s {
+            let after = HeaderValue::from(seconds);
+            response.headers_mut().insert(header::RETRY_AFTER, after);
         }
         response.extensions_mut().insert(ProblemWords(self.words));
         response

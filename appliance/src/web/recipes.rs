@@ -20,8 +20,9 @@ use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::plan::{GoldenView, Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::store::exchange::Destination;
-use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
+use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile};
 use crate::station::control::MAX_RECIPE;
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 /// A recipe whose planning takes longer is stored with a warning.
@@ -53,7 +54,7 @@ impl From<ChangeError> for Problem {
 }
 
 pub(super) async fn list(site: Site) -> Answered<Json<Value>> {
-    let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
+    let listed = site.aside(|site| Ok(listed(site))).await?;
     Ok(Json(listed))
 }
 
@@ -62,7 +63,11 @@ pub(super) async fn kinds() -> Json<Value> {
     Json(crate::recipe::file::kinds::json())
 }
 
-fn listed(recipes: &Store) -> Value {
+fn listed(site: &Site) -> Value {
+    let recipes = &site.recipes;
+    // Without the record it is not known who made them.
+    let makers = site.access.record().makers().unwrap_or_default();
+    let summary = |file: &RecipeFile| summary(file, &makers);
     let rows = recipes.numbers().into_iter().map(|number| {
         let mut row = match recipes.manifest(number) {
             Ok(file) => summary(&file),
@@ -78,10 +83,12 @@ fn listed(recipes: &Store) -> Value {
     })
 }
 
-fn summary(file: &RecipeFile) -> Value {
+fn summary(file: &RecipeFile, makers: &HashMap<String, String>) -> Value {
+    let taught_by = Some(&file.taught_by).filter(|by| !by.starts_with("fringed"));
     json!({
         "number": file.number, "name": file.name, "part_number": file.part_number,
         "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
+        "made_by": makers.get(&file.fingerprint).or(taught_by),
         "features": file.features.len(), "gauges": file.gauges.len(), "judges_nothing": file.judges_nothing,
         "everything": file.everything,
         "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
@@ -149,7 +156,7 @@ pub(super) async fn edit(
     Path(number): Path<u16>,
     request: Request<Body>,
 ) -> Answered<(Extension<Changed>, Json<Value>)> {
-    let wanted: Edit = request::edit(request.into_body()).await?;
+    let wanted: Edit = request::edit(request).await?;
     let edited = site.change(move |site| {
         let mut note = None;
         let fits = |recipe| {
@@ -172,7 +179,11 @@ pub(super) async fn edit(
     let answer = json!({
         "fingerprint": fingerprint, "active": active, "loading": loading, "note": note,
     });
-    Ok((Extension(Changed(changed)), Json(answer)))
+    let changed = Changed {
+        words: changed,
+        recipe: Some((number, fingerprint)),
+    };
+    Ok((Extension(changed), Json(answer)))
 }
 
 /// Brings back the previous generation, or a deleted recipe.
@@ -195,11 +206,15 @@ pub(super) async fn undo(
         Some(before) => file.differences(&before),
         None => "brought back".into(),
     };
-    let changed = format!("fingerprint {:.8}: {changed}", file.fingerprint);
+    let changed = Changed {
+        words: format!("fingerprint {:.8}: {changed}", file.fingerprint),
+        // The version was made by whom the record names for it.
+        recipe: None,
+    };
     let answer = json!({
         "number": number, "name": file.name, "fingerprint": file.fingerprint, "active": active, "loading": loading,
     });
-    Ok((Extension(Changed(changed)), Json(answer)))
+    Ok((Extension(changed), Json(answer)))
 }
 
 /// Deletes a recipe that is not the active one; undo brings it back.
@@ -255,7 +270,8 @@ pub(super) async fn import(
             "import as recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
-    let upload = request::file(&site, request.into_body()).await?;
+    let folder = site.recipes.folder().to_path_buf();
+    let upload = request::file(&site, request, folder, request::RECIPE).await?;
     let stored = site.change(move |site| {
         let mut recipe = upload.file.recipe().map_err(Problem::unfit)?;
         let id = recipe.id.clone();
@@ -269,7 +285,10 @@ pub(super) async fn import(
         Ok((imported, note))
     });
     let (imported, note) = stored.await?;
-    let changed = Extension(Changed(imported.changed()));
+    let changed = Extension(Changed {
+        words: imported.changed(),
+        recipe: Some((imported.id.number, imported.id.fingerprint.clone())),
+    });
     let id = imported.id;
     let answer = json!({
         "number": id.number, "name": id.name, "fingerprint": id.fingerprint, "note": note,

@@ -12,12 +12,12 @@ use std::time::{Duration, Instant};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
-use tokio::sync::oneshot;
 
-use super::downloads::ToClient;
+use super::downloads::{ToClient, sent_alone};
 use super::problem::{Answered, Problem};
 use super::request::Query;
 use super::site::Site;
+use crate::history::carry::EarlierHistory;
 use crate::history::export::{After, Page};
 use crate::history::{Entry, GaugeEntry};
 use crate::station::Verdict;
@@ -47,6 +47,9 @@ struct FirstLine<'a> {
     history: &'a str,
     first: Option<u32>,
     last: Option<u32>,
+    /// The results up to a SEQ were kept under another id before.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    earlier: &'a [EarlierHistory],
 }
 
 /// Any other line. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
@@ -91,9 +94,8 @@ pub(super) async fn after(site: Site, Query(wanted): Query<AfterQuery>) -> Answe
     let permit = site.collecting.clone().try_acquire_owned();
     let crowded = "too many programs collect results: wait until one is done";
     let permit = permit.map_err(|_| Problem::crowded(crowded))?;
-    let (mut to, body) = ToClient::new();
-    let (begun, beginning) = oneshot::channel::<Answered<()>>();
-    let work = move || {
+    let failed = "reading the history failed; see the log";
+    let body = sent_alone("collecting", failed, move |mut to, begun| {
         // Held until the client has received everything or is gone.
         let _permit = permit;
         computing::stand_back();
@@ -111,21 +113,19 @@ pub(super) async fn after(site: Site, Query(wanted): Query<AfterQuery>) -> Answe
                 }
             }
         }
-    };
-    let failed = "reading the history failed; see the log";
-    let thread = std::thread::Builder::new().name("collecting".into());
-    thread.spawn(work).map_err(|_| Problem::broken(failed))?;
-    beginning.await.map_err(|_| Problem::broken(failed))??;
+    });
+    let body = body.await?;
     Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], body).into_response())
 }
 
 fn write(to: &mut ToClient, serial: &str, mut walk: After, mut page: Page) -> io::Result<()> {
-    let history = walk.id().to_owned();
+    let (history, earlier) = (walk.id().to_owned(), walk.earlier().to_vec());
     let header = FirstLine {
         serial,
         history: &history,
         first: page.first,
         last: page.last,
+        earlier: &earlier,
     };
     line(to, &header)?;
     while !page.results.is_empty() {

@@ -1,15 +1,17 @@
-//! The HTTP server: the table of all paths, the headers of every answer, and connections, which are
+//! The HTTP server: the table of all paths with the role that each needs, the headers of every answer, and connections, which are
 //! accepted within their limits and closed where they are too slow.
 
-use super::gate::{self, ChangeName, Peer, own_page_only, signed_in_only};
+use super::gate::Least::{self, Anyone, Collector, User};
+use super::gate::{self, Peer, Rule, own_page_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::slots::{Slot, Slots};
 use super::view::{self, Following};
 use super::{
-    assets, downloads, head, history, look, maps, metrics, orders, recipes, results, statistics,
-    studies, tries, triggers,
+    assets, backup, changes, downloads, head, history, look, maps, metrics, orders, recipes,
+    results, session, statistics, studies, tries, triggers, users,
 };
+use crate::access::Role::{self, Engineer, Operator, Technician, Viewer};
 use crate::system::clock;
 use axum::extract::Request;
 use axum::handler::Handler;
@@ -45,6 +47,8 @@ pub struct Route {
     pub method: Method,
     /// The path, with parameters in braces.
     pub path: &'static str,
+    /// Who may ask for it.
+    pub least: Least,
     /// Its name in the record of changes; none if it changes nothing.
     pub changes: Option<&'static str>,
     answer: MethodRouter<Site>,
@@ -70,6 +74,7 @@ impl Handler<(), Site> for BoxedHandler {
 }
 
 fn route<T: 'static>(
+    least: Least,
     (method, filter): (Method, MethodFilter),
     path: &'static str,
     changes: Option<&'static str>,
@@ -78,6 +83,7 @@ fn route<T: 'static>(
     Route {
         method,
         path,
+        least,
         changes,
         answer: on(
             filter,
@@ -89,34 +95,52 @@ fn route<T: 'static>(
 }
 
 fn look<T: 'static>(path: &'static str, handler: impl Handler<T, Site>) -> Route {
-    route(GET, path, None, handler)
+    route(User(Viewer), GET, path, None, handler)
 }
 
-/// A change: needs a session, and is recorded as `action`.
+/// As [`look`], also for programs at the configured addresses.
+fn collect<T: 'static>(path: &'static str, handler: impl Handler<T, Site>) -> Route {
+    route(Collector, GET, path, None, handler)
+}
+
+/// A change by a user with a role or more, which is recorded as `action`.
 fn change<T: 'static>(
+    role: Role,
     method: (Method, MethodFilter),
     path: &'static str,
     action: &'static str,
     handler: impl Handler<T, Site>,
 ) -> Route {
-    route(method, path, Some(action), handler)
+    route(User(role), method, path, Some(action), handler)
+}
+
+/// What changes nothing and is not for every viewer.
+fn only<T: 'static>(
+    role: Role,
+    method: (Method, MethodFilter),
+    path: &'static str,
+    handler: impl Handler<T, Site>,
+) -> Route {
+    route(User(role), method, path, None, handler)
 }
 
 /// Every path that is answered, but for the page's own files.
+#[rustfmt::skip]
 pub fn routes() -> Vec<Route> {
     vec![
         look("/events", view::follow),
-        look("/healthz", look::health),
-        look("/readyz", look::readiness),
-        look("/metrics", metrics::metrics),
+        collect("/healthz", look::health),
+        collect("/readyz", look::readiness),
+        collect("/metrics", metrics::metrics),
         look("/api/openapi.json", look::openapi),
-        look("/api/snapshot", look::snapshot),
+        collect("/api/snapshot", look::snapshot),
         look("/api/picture/{layer}", look::picture),
         look("/api/teach/part", look::part_seen),
         look("/api/trends", history::trends),
         look("/api/registers", look::registers),
         look("/api/log", look::log),
-        look("/api/changes", look::changes),
+        look("/api/changes", changes::list),
+        look("/api/changes.csv", changes::csv),
         look("/api/last/cloud.ply", downloads::cloud),
         look("/api/last/maps.npz", maps::last),
         look("/api/last/recording.zip", downloads::recording),
@@ -129,7 +153,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}/features", history::features),
         look("/api/history/{seq}/maps.npz", maps::kept),
         look("/api/history/{seq}/recording.zip", history::recording),
-        look("/api/results", results::after),
+        collect("/api/results", results::after),
         look("/api/statistics", statistics::statistics),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/kinds", recipes::kinds),
@@ -138,78 +162,44 @@ pub fn routes() -> Vec<Route> {
         look("/api/recipes/{number}/file", recipes::export),
         look("/api/recipes/{number}/maps.npz", maps::golden),
         look("/api/recipes/{number}/picture/{layer}", recipes::picture),
-        change(POST, "/api/recipes", "import recipe", recipes::import),
-        change(PUT, "/api/recipes/{number}", "edit recipe", recipes::edit),
-        route(POST, "/api/recipes/{number}/try", None, tries::attempt),
-        change(
-            DELETE,
-            "/api/recipes/{number}",
-            "delete recipe",
-            recipes::delete,
-        ),
-        change(
-            POST,
-            "/api/recipes/{number}/undo",
-            "undo recipe",
-            recipes::undo,
-        ),
-        change(
-            POST,
-            "/api/recipes/{number}/load",
-            "load recipe",
-            orders::load,
-        ),
-        change(
-            POST,
-            "/api/recipes/{number}/teach",
-            "teach recipe",
-            orders::teach,
-        ),
-        change(POST, "/api/trigger", "trigger", triggers::trigger),
-        change(POST, "/api/reset", "reset errors", orders::reset),
+        change(Engineer, POST, "/api/recipes", "import recipe", recipes::import),
+        change(Technician, PUT, "/api/recipes/{number}", "edit recipe", recipes::edit),
+        only(Technician, POST, "/api/recipes/{number}/try", tries::attempt),
+        change(Engineer, DELETE, "/api/recipes/{number}", "delete recipe", recipes::delete),
+        change(Technician, POST, "/api/recipes/{number}/undo", "undo recipe", recipes::undo),
+        change(Operator, POST, "/api/recipes/{number}/load", "load recipe", orders::load),
+        change(Technician, POST, "/api/recipes/{number}/teach", "teach recipe", orders::teach),
+        change(Operator, POST, "/api/trigger", "trigger", triggers::trigger),
+        change(Operator, POST, "/api/reset", "reset errors", orders::reset),
         look("/api/head", head::state),
         look("/api/head/board.pdf", head::board_pdf),
-        look("/api/head/live", head::live),
-        look("/api/head/live/figures", head::figures),
+        only(Technician, GET, "/api/head/live", head::live),
+        only(Technician, GET, "/api/head/live/figures", head::figures),
         look("/api/head/poses/{number}/picture", head::pose),
-        change(
-            POST,
-            "/api/head/steps/{name}",
-            "commission head",
-            head::step,
-        ),
-        change(
-            DELETE,
-            "/api/head/steps/{name}",
-            "end step of commissioning",
-            head::end,
-        ),
+        change(Technician, POST, "/api/head/steps/{name}", "commission head", head::step),
+        change(Technician, DELETE, "/api/head/steps/{name}", "end step of commissioning", head::end),
         look("/api/simulation/part", head::part),
-        change(
-            PUT,
-            "/api/simulation/part",
-            "place simulated part",
-            head::put_part,
-        ),
+        change(Engineer, PUT, "/api/simulation/part", "place simulated part", head::put_part),
         look("/api/studies", studies::list),
         look("/api/studies/{number}", studies::one),
         look("/api/studies/{number}/{name}", studies::file),
-        change(POST, "/api/studies", "begin study", studies::begin),
-        change(
-            POST,
-            "/api/studies/{number}/{name}",
-            "run or pause study",
-            studies::order,
-        ),
-        change(
-            DELETE,
-            "/api/studies/{number}",
-            "delete study",
-            studies::delete,
-        ),
-        look("/api/session", gate::session),
-        route(POST, "/api/session", None, gate::begin_session),
-        route(DELETE, "/api/session", None, gate::end_session),
+        change(Technician, POST, "/api/studies", "begin study", studies::begin),
+        change(Technician, POST, "/api/studies/{number}/{name}", "run or pause study", studies::order),
+        change(Technician, DELETE, "/api/studies/{number}", "delete study", studies::delete),
+        only(Engineer, GET, "/api/users", users::list),
+        change(Engineer, PUT, "/api/users/{name}", "set user", users::set),
+        change(Engineer, DELETE, "/api/users/{name}", "remove user", users::remove),
+        change(Engineer, GET, "/api/backup.zip", "back up", backup::make),
+        only(Engineer, GET, "/api/restore", backup::state),
+        change(Engineer, POST, "/api/restore", "check backup", backup::check),
+        change(Engineer, PUT, "/api/restore", "order restore", backup::order),
+        change(Engineer, DELETE, "/api/restore", "discard restore", backup::discard),
+        change(Engineer, POST, "/api/restore/undo", "order undo of restore", backup::undo),
+        change(Engineer, POST, "/api/restart", "restart", backup::restart),
+        route(Anyone, GET, "/api/session", None, session::state),
+        route(Anyone, POST, "/api/session", None, session::begin),
+        route(Anyone, PUT, "/api/session", None, session::set_password),
+        route(Anyone, DELETE, "/api/session", None, session::end),
     ]
 }
 
@@ -217,13 +207,14 @@ pub fn routes() -> Vec<Route> {
 pub fn router(site: Site) -> Router {
     let mut router = Router::new();
     for route in routes() {
-        let mut answer = route.answer;
-        // The layer that is added last runs first: origin, then session.
-        if let Some(action) = route.changes {
-            answer = answer
-                .route_layer(from_fn_with_state(site.clone(), signed_in_only))
-                .route_layer(Extension(ChangeName(action)));
-        }
+        // The layer that is added last runs first: origin, then role.
+        let mut answer = route
+            .answer
+            .route_layer(from_fn_with_state(site.clone(), gate::allowed_only))
+            .route_layer(Extension(Rule {
+                least: route.least,
+                changes: route.changes,
+            }));
         if route.method != Method::GET {
             answer = answer.route_layer(from_fn(own_page_only));
         }

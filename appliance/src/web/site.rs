@@ -17,6 +17,8 @@ use super::desk::Desk;
 use super::problem::{Answered, Problem};
 use super::slots::Slots;
 use super::slots::Tries;
+use crate::access::Access;
+use crate::backup::Backups;
 use crate::head::calibration::Current;
 use crate::history::Reader;
 use crate::history::studies::Studies;
@@ -31,7 +33,6 @@ use crate::recipe::teach::part::LastSeen;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::journal::Logbook;
 use crate::system::socket;
-use crate::web::access::Access;
 
 /// The most pages that follow the events at a time.
 pub const MAX_FOLLOWERS: usize = 16;
@@ -96,6 +97,14 @@ pub struct Parts {
     pub hosts: Vec<String>,
     /// Networks of proxies: one such address stands for many clients.
     pub proxies: Vec<IpNet>,
+    /// Whether everybody may look without signing in.
+    pub looking_is_open: bool,
+    /// Networks of programs that collect without signing in.
+    pub collectors: Vec<IpNet>,
+    /// Backups of this device, and the way back.
+    pub backups: Backups,
+    /// Ends the program where a service manager starts it anew; none without one.
+    pub restart: Option<Box<dyn Fn() + Send + Sync>>,
 }
 
 /// The parts with the limits of concurrent work, shared by all requests. Cheap to clone.
@@ -112,6 +121,11 @@ pub struct Site {
     pub(super) collecting: Arc<Semaphore>,
     /// A permit to work statistics out.
     pub(super) reckoning: Arc<Semaphore>,
+    /// The uptime at which a refused change of somebody who had not signed in was recorded last, and
+    /// one more, s; 0 if none was.
+    pub(super) stranger_at_s: Arc<AtomicU32>,
+    /// Held while a backup is made, or one is checked.
+    pub(super) carrying: Arc<Mutex<()>>,
     /// The uptime at which a program asked for results last, s; 0 if none did.
     pub(super) collected_at_s: Arc<AtomicU32>,
     /// The maps of a kept part that were computed last; locked while something else is computed of
@@ -155,6 +169,8 @@ impl Site {
             files: Arc::new(Semaphore::new(MAX_FILES)),
             collecting: Arc::new(Semaphore::new(MAX_COLLECTING)),
             reckoning: Arc::new(Semaphore::new(1)),
+            stranger_at_s: Arc::default(),
+            carrying: Arc::default(),
             collected_at_s: Arc::default(),
             kept: Arc::default(),
             opened: Arc::default(),

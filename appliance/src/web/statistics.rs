@@ -2,7 +2,7 @@
 //!
 //! A thread of its own works, only where a core has nothing else to do; one at a time.
 
-use super::downloads::ToClient;
+use super::downloads::sent_alone;
 use super::problem::{Answered, Problem};
 use super::request::Query;
 use super::results::line;
@@ -19,7 +19,6 @@ use serde_json::json;
 use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
-use tokio::sync::oneshot;
 
 /// Columns of a chart, unless asked for another number.
 const COLUMNS: usize = 120;
@@ -120,9 +119,7 @@ pub(super) async fn statistics(
     let turn = turn
         .map_err(crowded)?
         .map_err(|_| Problem::broken(FAILED))?;
-    let (mut to, body) = ToClient::new();
-    let (begun, beginning) = oneshot::channel::<Answered<()>>();
-    let work = move || {
+    let body = sent_alone("statistics", FAILED, move |mut to, begun| {
         let _turn = turn;
         computing::stand_back();
         let (mut begun, mut waited) = (Some(begun), Duration::ZERO);
@@ -149,10 +146,8 @@ pub(super) async fn statistics(
             )),
         });
         to.end(ended.map_err(|()| io::ErrorKind::Other.into()));
-    };
-    let thread = std::thread::Builder::new().name("statistics".into());
-    thread.spawn(work).map_err(|_| Problem::broken(FAILED))?;
-    beginning.await.map_err(|_| Problem::broken(FAILED))??;
+    });
+    let body = body.await?;
     Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], body).into_response())
 }
 

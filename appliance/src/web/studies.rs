@@ -73,7 +73,7 @@ pub(super) async fn one(site: Site, Path(number): Path<u32>) -> Answered<Json<Va
 }
 
 pub(super) async fn begin(site: Site, request: Request<Body>) -> Answered<Json<Value>> {
-    let asked: StudyDesign = request::json(request.into_body()).await?;
+    let asked: StudyDesign = request::json(request).await?;
     let begun = site.change(move |site| {
         let recipe = site
             .recipes
@@ -105,7 +105,7 @@ pub(super) async fn order(
     Path((number, order)): Path<(u32, String)>,
     request: Request<Body>,
 ) -> Answered<Json<Value>> {
-    let RunRequest { again } = request::json_if_any(request.into_body()).await?;
+    let RunRequest { again } = request::json_if_any(request).await?;
     let study = site
         .aside(move |site| Ok(site.studies.read(number)?))
         .await?;

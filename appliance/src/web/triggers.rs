@@ -39,7 +39,7 @@ pub(super) async fn trigger(
     headers: HeaderMap,
     request: Asked<Body>,
 ) -> Answered<Response> {
-    let order: TriggerOrder = request::json_if_any(request.into_body()).await?;
+    let order: TriggerOrder = request::json_if_any(request).await?;
     let mut session = DefaultHasher::new();
     gate::token(&headers).hash(&mut session);
     let trigger = Trigger {

@@ -2,6 +2,8 @@
 
 use super::part::PART;
 use super::plant::{runtime, settings};
+use appliance::access::{Access, Record};
+use appliance::backup::Backups;
 use appliance::history::Reader;
 use appliance::history::studies::Studies;
 use appliance::production::commissioning::Commission;
@@ -10,7 +12,6 @@ use appliance::production::latest::LastCycleRequests;
 use appliance::production::simulation::Simulation;
 use appliance::recipe::Store;
 use appliance::station::{Micros, Station, StationHandle};
-use appliance::web::access::Access;
 use appliance::web::{Parts, Site, serve};
 use std::cell::RefCell;
 use std::fs;
@@ -57,7 +58,9 @@ impl Page {
         let folder = tempfile::tempdir().expect("a folder");
         let station = Station::new(settings(), Micros(0));
         let station = StationHandle::new(station, Instant::now(), |_| None);
-        let (access, secret) = Access::open(&folder.path().join("access"), None).expect("access");
+        let record = Record::of(folder.path(), 1 << 20);
+        let opened = Access::open(&folder.path().join("access"), None, record).expect("access");
+        let access = opened.access;
         let recipes = folder.path().join("recipes");
         let (orders, _) = mpsc::channel();
         let (commission, _) = Commission::open(folder.path());
@@ -81,6 +84,10 @@ impl Page {
             calibration_file: None,
             hosts: vec!["sensor.local".into()],
             proxies: Vec::new(),
+            looking_is_open: true,
+            collectors: Vec::new(),
+            backups: Backups::of(folder.path()),
+            restart: None,
         });
         let address = runtime.block_on(async {
             let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
@@ -92,7 +99,7 @@ impl Page {
             runtime,
             address,
             access,
-            secret: secret.expect("a new device makes its secret").secret,
+            secret: opened.made.expect("a new device makes its secret").secret,
             token: RefCell::default(),
             recipes,
             _folder: folder,
@@ -115,9 +122,9 @@ impl Page {
         }
         let now = Instant::now();
         let mut token = self.token.borrow_mut();
-        if !self.access.is_signed_in(&token, now) {
-            let session = self.access.sign_in(ELSEWHERE, &self.secret, now);
-            *token = session.expect("the secret is right").text().to_owned();
+        if self.access.signed_in(&token, now).is_none() {
+            let session = self.access.sign_in(ELSEWHERE, None, &self.secret, now);
+            *token = session.expect("the secret is right").0.text().to_owned();
         }
         let mut bytes = Vec::new();
         let mut rest = data;

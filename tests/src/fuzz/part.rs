@@ -42,6 +42,7 @@ impl Part {
             number: 1,
             part_number: "P-1".into(),
             name: "plane".into(),
+            taught_by: "the fuzz targets".into(),
             taught_at_unix_s: 0,
             placement_tolerance_mm: 0.5,
             exposures: None,

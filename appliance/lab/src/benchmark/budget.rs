@@ -122,6 +122,7 @@ pub fn budgets(
         number: 1,
         part_number: "BENCH".into(),
         name: "bench".into(),
+        taught_by: "bench".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: PLACEMENT_MM,
         exposures: None,

@@ -328,6 +328,14 @@ impl CalibrationFile {
         reference.horizontal.check_bounds("reference.horizontal")
     }
 
+    /// The names of the reference phase maps beside it.
+    pub fn maps(&self) -> Vec<&str> {
+        let maps = self.reference.as_ref();
+        maps.map_or_else(Vec::new, |maps| {
+            vec![&*maps.vertical.file, &*maps.horizontal.file]
+        })
+    }
+
     /// What the measured reference plane is off the models.
     fn plane(&self) -> Option<PlaneModel> {
         Some(self.reference.as_ref()?.plane.clone())

@@ -144,13 +144,8 @@ impl CalibrationPlace {
     /// only takes room.
     fn forget_maps(&self) {
         let generations = [read(&self.path), read(&self.previous())];
-        let named: Vec<&str> = generations
-            .iter()
-            .flatten()
-            .flatten()
-            .filter_map(|file| file.reference.as_ref())
-            .flat_map(|maps| [maps.vertical.file.as_str(), maps.horizontal.file.as_str()])
-            .collect();
+        let files = generations.iter().flatten().flatten();
+        let named: Vec<&str> = files.flat_map(CalibrationFile::maps).collect();
         for entry in fs::read_dir(self.folder()).into_iter().flatten().flatten() {
             let name = entry.file_name();
             let Some(name) = name.to_str() else { continue };

@@ -4,9 +4,7 @@
 //! Dropping it removes the file; files that a kill leaves behind are removed at the next start.
 
 use crate::recipe::{Recipe, RecipeFile, Refusal, Store};
-use crate::station::FULL_STORAGE_MIB;
-use crate::storage::folder::rename_whole;
-use rustix::fs::fstatvfs;
+use crate::storage::folder::{check_room, rename_whole};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -26,30 +24,40 @@ pub struct Incoming {
     bytes: u64,
 }
 
-impl Store {
-    /// Begins a file of `expected` bytes; 0 if the size is not known.
+impl Incoming {
+    /// Begins a file of `expected` bytes in a folder; 0 if the size is not known.
     ///
     /// # Errors
     /// Errors of the file system, or that the file would leave less free storage than the station
     /// needs.
-    pub fn receive(&self, expected: u64) -> io::Result<Incoming> {
+    pub fn begin(folder: &Path, expected: u64) -> io::Result<Self> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         loop {
             let count = COUNT.fetch_add(1, Ordering::Relaxed);
             let name = format!("{PREFIX}{}-{count}.new", std::process::id());
-            let path = self.folder.join(name);
+            let path = folder.join(name);
             let opened = File::options().write(true).create_new(true).open(&path);
             match opened {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 opened => {
                     let file = opened?;
                     let bytes = 0;
-                    let incoming = Incoming { path, file, bytes };
-                    incoming.check_room(expected)?;
+                    let incoming = Self { path, file, bytes };
+                    check_room(&incoming.file, expected)?;
                     return Ok(incoming);
                 }
             }
         }
+    }
+}
+
+impl Store {
+    /// Begins a recipe's file in its folder.
+    ///
+    /// # Errors
+    /// As [`Incoming::begin`].
+    pub fn receive(&self, expected: u64) -> io::Result<Incoming> {
+        Incoming::begin(&self.folder, expected)
     }
 
     /// Stores a received file under a number; the old recipe stays as the previous generation. The
@@ -95,19 +103,6 @@ impl Incoming {
     pub(crate) fn read(&self) -> Result<(RecipeFile, Recipe), Refusal> {
         Recipe::read_to_edit(BufReader::new(File::open(&self.path)?), self.bytes)
     }
-
-    /// Checks that `more` bytes leave as much free storage as the station needs.
-    fn check_room(&self, more: u64) -> io::Result<()> {
-        let storage = fstatvfs(&self.file)?;
-        let free = storage.f_bavail.saturating_mul(storage.f_frsize);
-        let needed = (FULL_STORAGE_MIB << 20).saturating_add(more);
-        if free >= needed {
-            return Ok(());
-        }
-        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-        let words = format!("{} MiB are free, {} are needed", mib(free), mib(needed));
-        Err(io::Error::new(ErrorKind::StorageFull, words))
-    }
 }
 
 impl Write for Incoming {
@@ -116,7 +111,7 @@ impl Write for Incoming {
         let before = self.bytes;
         self.bytes += written as u64;
         if before / STRETCH < self.bytes / STRETCH {
-            self.check_room(0)?;
+            check_room(&self.file, 0)?;
         }
         Ok(written)
     }

@@ -84,6 +84,11 @@ impl Store {
         opened.map_err(Exit::CannotCreate.advising(what, remedy))
     }
 
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     pub(crate) fn path(&self, number: u16) -> PathBuf {
         self.folder.join(format!("{number:04}.recipe"))
     }
@@ -134,7 +139,10 @@ impl Store {
     }
 
     /// Keeps other processes from changing the recipes until the returned file is dropped.
-    pub(crate) fn lock(&self) -> io::Result<fs::File> {
+    ///
+    /// # Errors
+    /// Errors of the file system.
+    pub fn lock(&self) -> io::Result<fs::File> {
         let lock = fs::File::create(self.folder.join("lock"))?;
         lock.lock()?;
         Ok(lock)

@@ -49,6 +49,9 @@ const OPENING_REACH: usize = 4;
 /// |ΔΦ| up to which the expansion of the height is used, turns.
 const EXPANSION_TURNS: f64 = 0.5;
 
+/// What teaches where nobody is known who ordered it.
+pub const THIS_PROGRAM: &str = concat!("fringed ", env!("CARGO_PKG_VERSION"));
+
 /// Names of a recipe, its placement tolerance and its exposures.
 #[derive(Clone, Debug)]
 pub struct Naming {
@@ -58,6 +61,8 @@ pub struct Naming {
     pub part_number: String,
     /// For people.
     pub name: String,
+    /// Who or what taught it.
+    pub taught_by: String,
     /// When, in seconds since 1970 UTC; 0 if not known.
     pub taught_at_unix_s: u64,
     /// How far any corner of a part may lie from where it was taught, mm.
@@ -239,7 +244,7 @@ impl GoldenPart<'_> {
             number: naming.number,
             part_number: naming.part_number.clone(),
             name: naming.name.clone(),
-            taught_by: concat!("fringed ", env!("CARGO_PKG_VERSION")).into(),
+            taught_by: naming.taught_by.clone(),
             taught_at_unix_s: naming.taught_at_unix_s,
             calibration: calibration.fingerprint(),
             camera: CameraFile {

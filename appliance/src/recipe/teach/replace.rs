@@ -3,7 +3,7 @@
 //! Gauges that follow golden: their limits and masters are worked out again whenever golden, the
 //! gauges or the production sequence change.
 
-use super::golden::{Naming, UnsealedRecipe};
+use super::golden::{Naming, THIS_PROGRAM, UnsealedRecipe};
 use super::good_parts::DEVIATION_MM;
 use super::planner;
 use super::planner::Choice;
@@ -41,6 +41,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         number,
         part_number: format!("PART-{number:04}"),
         name: format!("Part {number}"),
+        taught_by: THIS_PROGRAM.into(),
         taught_at_unix_s: crate::system::clock::utc_or_told_s().unwrap_or(0),
         placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
         exposures: None,

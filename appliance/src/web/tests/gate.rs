@@ -1,59 +1,336 @@
-//! Who may change what.
+//! Who may do what.
 
 use super::*;
+use crate::access::Role;
+use crate::web::gate::Least;
 
-const CHANGES: [(&str, &str); 14] = [
-    ("POST", "/api/trigger"),
-    ("POST", "/api/reset"),
-    ("POST", "/api/recipes"),
-    ("PUT", "/api/recipes/1"),
-    ("DELETE", "/api/recipes/1"),
-    ("POST", "/api/recipes/1/undo"),
-    ("POST", "/api/recipes/1/load"),
-    ("POST", "/api/recipes/1/teach"),
-    ("POST", "/api/head/steps/plane"),
-    ("DELETE", "/api/head/steps/plane"),
-    ("PUT", "/api/simulation/part"),
-    ("POST", "/api/studies"),
-    ("POST", "/api/studies/1/run"),
-    ("DELETE", "/api/studies/1"),
-];
+/// A path of a route, with something in place of its parameters.
+fn path(route: &server::Route) -> String {
+    route
+        .path
+        .replace("{number}", "1")
+        .replace("{layer}", "height")
+        .replace("{seq}", "1")
+        .replace("{name}", "plane")
+}
+
+/// The routes but for those that never end or are about sessions themselves.
+fn rows() -> impl Iterator<Item = server::Route> {
+    let routes = server::routes().into_iter();
+    routes.filter(|route| route.path != "/events" && route.path != "/api/session")
+}
+
+/// A user of each role, by a name that is the role's; their cookies.
+async fn users(served: &Served) -> Vec<(Role, String)> {
+    let mut cookies = Vec::new();
+    for role in Role::ALL {
+        let by = (None, "a test");
+        let access = &served.site.access;
+        let name = format!("a-{}", role.word());
+        access
+            .set_user(&name, role, Some("correct horse"), by)
+            .unwrap();
+        let body = format!("{{\"user\": \"{name}\", \"secret\": \"correct horse\"}}");
+        cookies.push((role, served.sign_in_with(&body).await));
+    }
+    cookies
+}
 
 #[tokio::test]
-async fn looking_needs_no_login_and_every_change_needs_one() {
-    let served = served().await;
-    let mut guarded = 0;
-    for route in server::routes() {
-        let path = route
-            .path
-            .replace("{number}", "1")
-            .replace("{layer}", "height")
-            .replace("{seq}", "1")
-            .replace("{name}", "plane");
-        let method = route.method.as_str();
-        if route.path == "/events" || route.path == "/api/session" {
-            continue;
+async fn each_route_is_answered_for_those_who_may_and_for_nobody_else() {
+    for looking_is_open in [true, false] {
+        let served = served_to(looking_is_open).await;
+        let users = users(&served).await;
+        let mut cases: Vec<(Option<Role>, String)> = vec![(None, String::new())];
+        cases.extend(
+            users
+                .iter()
+                .map(|(role, cookie)| (Some(*role), cookie.clone())),
+        );
+        // A session whose user has just lost its role, or is gone.
+        let lost = |name: &'static str| {
+            let body = format!("{{\"user\": \"{name}\", \"secret\": \"correct horse\"}}");
+            let access = served.site.access.clone();
+            let by = (None, "a test");
+            access
+                .set_user(name, Role::Engineer, Some("correct horse"), by)
+                .unwrap();
+            body
+        };
+        let demoted = served.sign_in_with(&lost("demoted")).await;
+        let removed = served.sign_in_with(&lost("removed")).await;
+        let access = &served.site.access;
+        access
+            .set_user("demoted", Role::Operator, None, (None, "a test"))
+            .unwrap();
+        access.remove_user("removed").unwrap();
+        cases.extend([(Some(Role::Operator), demoted), (None, removed)]);
+        for route in rows() {
+            let path = path(&route);
+            for (role, cookie) in &cases {
+                let least = match route.least {
+                    Least::Anyone => None,
+                    Least::Collector => Some(Role::Viewer),
+                    Least::User(least) => Some(least),
+                };
+                let open = looking_is_open && least <= Some(Role::Viewer);
+                let wanted = match (least, role) {
+                    _ if open => None,
+                    (None, _) => None,
+                    (Some(_), None) => Some(401),
+                    (Some(least), Some(role)) => (*role < least).then_some(403),
+                };
+                let method = route.method.as_str();
+                let answer = served.change(method, &path, cookie, "{").await;
+                match wanted {
+                    // What the role may is answered in whatever other way.
+                    None => assert!(
+                        ![401, 403].contains(&answer.status),
+                        "{role:?} {method} {path}: {answer:?}"
+                    ),
+                    Some(status) => {
+                        assert_eq!(answer.status, status, "{role:?} {method} {path}");
+                        let words = least.map(Role::or_more).unwrap_or_default();
+                        let said = answer.body.contains("sign in") || answer.body.contains(&words);
+                        assert!(said, "{answer:?}");
+                    }
+                }
+            }
         }
-        let answer = served
-            .change(method, &path, "fringed-session=0", "{}")
-            .await;
-        if route.changes.is_some() {
-            guarded += 1;
-            assert_eq!(answer.status, 401, "{method} {path}: {answer:?}");
-            assert!(answer.body.contains("sign in"), "{answer:?}");
-        } else {
-            let tries = path.ends_with("/try");
+        assert_eq!(served.handle.snapshot().triggers, 0);
+    }
+}
+
+#[test]
+fn the_rows_have_the_roles_of_the_table() {
+    let of = |role| -> Vec<String> {
+        let rows = rows().filter(|route| route.least == Least::User(role));
+        rows.map(|route| format!("{} {}", route.method, route.path))
+            .collect()
+    };
+    let operators = ["/load", "/trigger", "/reset"];
+    assert!(
+        of(Role::Operator)
+            .iter()
+            .all(|row| operators.iter().any(|end| row.ends_with(end)))
+    );
+    assert_eq!(of(Role::Operator).len(), 3);
+    for (role, rows) in [
+        (
+            Role::Technician,
+            &[
+                "/teach",
+                "/try",
+                "/undo",
+                "PUT /api/recipes",
+                "/studies",
+                "/steps",
+                "/live",
+            ][..],
+        ),
+        (
+            Role::Engineer,
+            &[
+                "POST /api/recipes",
+                "DELETE /api/recipes",
+                "/simulation",
+                "/users",
+                "/backup",
+                "/restore",
+                "/restart",
+            ],
+        ),
+    ] {
+        for row in of(role) {
             assert!(
-                method == "GET" || tries,
-                "{path} changes something without being recorded"
+                rows.iter().any(|part| row.contains(part)),
+                "{row} needs {role:?}"
             );
-            // Only a live picture makes the head expose, and only a try takes a core for long.
-            let needs = path.starts_with("/api/head/live") || tries;
-            assert_eq!(answer.status == 401, needs, "{path}: {answer:?}");
+        }
+        for part in rows {
+            assert!(of(role).iter().any(|row| row.contains(part)), "{part}");
         }
     }
-    assert_eq!(guarded, CHANGES.len());
-    assert_eq!(served.handle.snapshot().triggers, 0);
+    for route in rows() {
+        let looks = route.least <= Least::User(Role::Viewer);
+        assert!(
+            !looks || route.method == "GET",
+            "{} changes something for viewers",
+            route.path
+        );
+        assert!(!looks || route.changes.is_none(), "{}", route.path);
+    }
+}
+
+#[tokio::test]
+async fn programs_at_configured_addresses_collect_without_a_login_and_see_nothing_else() {
+    let served = served_to(false).await;
+    let statuses = async |from: [u8; 4]| {
+        let mut answered = Vec::new();
+        for route in rows().filter(|route| route.method == "GET") {
+            let status = served
+                .from(from, route.method.as_str(), &path(&route))
+                .await;
+            if status != 401 {
+                answered.push(route.path);
+            }
+        }
+        answered
+    };
+    let collected = statuses([127, 0, 0, 2]).await;
+    assert_eq!(
+        collected,
+        [
+            "/healthz",
+            "/readyz",
+            "/metrics",
+            "/api/snapshot",
+            "/api/results"
+        ]
+    );
+    assert_eq!(statuses([127, 0, 0, 3]).await, [""; 0]);
+    // The page itself and signing in are for everybody.
+    assert_eq!(served.get("/").await.status, 200);
+    let session = served.get("/api/session").await.json();
+    assert_eq!(
+        (&session["looking"], &session["role"]),
+        (&"signed-in".into(), &"viewer".into())
+    );
+    assert_eq!(session["needs"]["POST /api/trigger"], "operator");
+    assert!(session["needs"]["GET /api/history"].is_null());
+}
+
+#[tokio::test]
+async fn a_request_whose_sender_loses_the_role_while_its_body_comes_changes_nothing() {
+    let served = served().await;
+    let users = users(&served).await;
+    let cookie = &users[3].1;
+    let body = "{\"role\": \"engineer\", \"secret\": \"correct horse\"}";
+    let mut stream = TcpStream::connect(served.address).await.unwrap();
+    let head = format!(
+        "PUT /api/users/accomplice HTTP/1.1\r\nConnection: close\r\nHost: {0}\r\nOrigin: http://{0}\r\nCookie: {cookie}\r\nContent-Length: {1}\r\n\r\n{2}",
+        served.address,
+        body.len(),
+        &body[..10]
+    );
+    stream.write_all(head.as_bytes()).await.unwrap();
+    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    let access = &served.site.access;
+    access
+        .set_user("a-engineer", Role::Technician, None, (None, "a test"))
+        .unwrap();
+    stream.write_all(&body.as_bytes()[10..]).await.unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
+    assert!(answer.contains("an engineer"), "{answer}");
+    assert!(access.users().iter().all(|user| user.name != "accomplice"));
+}
+
+#[tokio::test]
+async fn a_user_changes_its_own_password_and_its_other_sessions_end() {
+    let served = served().await;
+    let users = users(&served).await;
+    let other = served
+        .sign_in_with("{\"user\": \"a-operator\", \"secret\": \"correct horse\"}")
+        .await;
+    let set = async |body: &str| {
+        served
+            .change("PUT", "/api/session", &users[1].1, body)
+            .await
+    };
+    assert_eq!(
+        set("{\"secret\": \"wrong\", \"new\": \"135790\"}")
+            .await
+            .status,
+        403
+    );
+    assert_eq!(
+        set("{\"secret\": \"correct horse\", \"new\": \"12345\"}")
+            .await
+            .status,
+        422
+    );
+    let answer = set("{\"secret\": \"correct horse\", \"new\": \"135790\"}").await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let cookie = answer
+        .header("set-cookie")
+        .unwrap()
+        .split(';')
+        .next()
+        .unwrap();
+    let state = async |cookie: &str| {
+        served
+            .ask("GET", "/api/session", &[("Cookie", cookie)], "")
+            .await
+            .json()
+    };
+    assert_eq!(state(cookie).await["user"], "a-operator");
+    assert_eq!(state(&other).await["signed_in"], false);
+    let engineer = served.sign_in().await;
+    let refused = served
+        .change(
+            "PUT",
+            "/api/session",
+            &engineer,
+            "{\"secret\": \"x\", \"new\": \"correct horse\"}",
+        )
+        .await;
+    assert!(
+        refused.status == 422 || refused.status == 403,
+        "{refused:?}"
+    );
+}
+
+#[tokio::test]
+async fn the_record_says_who_did_what_and_is_filtered_by_user_and_recipe() {
+    let served = served().await;
+    let users = users(&served).await;
+    served.change("POST", "/api/reset", &users[1].1, "").await;
+    served
+        .change("POST", "/api/recipes/7/teach", &users[1].1, "")
+        .await;
+    served
+        .change("POST", "/api/recipes/7/load", &users[2].1, "")
+        .await;
+    let list = async |query: &str| {
+        let answer = served.get(&format!("/api/changes?{query}")).await.json();
+        answer["changes"].as_array().unwrap().clone()
+    };
+    let of_operator = list("user=a-operator").await;
+    assert_eq!(of_operator.len(), 3);
+    assert_eq!(of_operator[0]["role"], "operator");
+    assert!(
+        of_operator[0]["outcome"]
+            .as_str()
+            .unwrap()
+            .contains("technician")
+    );
+    assert_eq!(list("recipe=7").await.len(), 2);
+    assert_eq!(list("limit=2").await.len(), 2);
+    assert_eq!(served.get("/api/changes?limit=0").await.status, 400);
+    assert_eq!(served.get("/api/changes?people=x").await.status, 400);
+    let csv = served.get("/api/changes.csv?user=a-operator").await;
+    assert!(csv.body.contains("number,time_utc"), "{csv:?}");
+    assert!(
+        csv.body
+            .contains("\"a-operator\",\"operator\",\"reset errors\""),
+        "{csv:?}"
+    );
+    assert_eq!(
+        served.site.access.record().check().unwrap().problems,
+        Vec::<String>::new()
+    );
+}
+
+#[tokio::test]
+async fn strangers_cannot_fill_the_record() {
+    let served = served().await;
+    for _ in 0..20 {
+        served.change("POST", "/api/trigger", "", "").await;
+    }
+    let changes = served.get("/api/changes").await.json();
+    assert_eq!(changes["changes"].as_array().unwrap().len(), 1);
 }
 
 #[tokio::test]
@@ -61,8 +338,8 @@ async fn a_change_from_another_site_s_page_is_refused_even_with_the_cookie() {
     let served = served().await;
     let cookie = served.sign_in().await;
     for origin in ["http://evil.example", "null", "", "http://127.0.0.1:1"] {
-        let tries = [("POST", "/api/recipes/1/try")];
-        for (method, path) in CHANGES.into_iter().chain(tries) {
+        for route in rows().filter(|route| route.method != "GET") {
+            let (method, path) = (route.method.as_str(), &path(&route));
             let headers = [("Origin", origin), ("Cookie", &*cookie)];
             let answer = served.ask(method, path, &headers, "{}").await;
             assert_eq!(answer.status, 403, "{method} {path} from {origin:?}");

@@ -18,6 +18,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
+use crate::access::{Access, Record};
+use crate::backup::Backups;
 use crate::history::Reader;
 use crate::history::studies::Studies;
 use crate::production::commissioning::Commission;
@@ -25,7 +27,6 @@ use crate::production::commissioning::live::Live;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
 use crate::station::*;
-use crate::web::access::Access;
 
 /// A station whose measuring task is silent, and its page.
 struct Served {
@@ -39,6 +40,11 @@ struct Served {
 }
 
 async fn served() -> Served {
+    served_to(true).await
+}
+
+/// With a page that everybody may look at, or users alone.
+async fn served_to(looking_is_open: bool) -> Served {
     let identity = Identity {
         vendor: "v".into(),
         product: "sensor".into(),
@@ -55,14 +61,15 @@ async fn served() -> Served {
     };
     let folder = tempfile::tempdir().unwrap();
     let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
-    let (access, secret) = Access::open(&folder.path().join("access"), None).unwrap();
+    let record = Record::of(folder.path(), 16 << 20);
+    let opened = Access::open(&folder.path().join("access"), None, record).unwrap();
     let (dates, dated) = mpsc::channel();
     let (orders, _) = mpsc::channel();
     let (commission, _) = Commission::open(folder.path());
     let site = Site::new(Parts {
         is_stored: Box::new(|| true),
         station: handle.clone(),
-        access,
+        access: opened.access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
         last_cycle: Default::default(),
@@ -79,6 +86,10 @@ async fn served() -> Served {
         calibration_file: Some(folder.path().join("calibration.json")),
         hosts: vec!["sensor.local".into()],
         proxies: vec!["127.9.9.9/32".parse().unwrap()],
+        looking_is_open,
+        collectors: vec!["127.0.0.2/32".parse().unwrap()],
+        backups: Backups::of(folder.path()),
+        restart: None,
     });
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
@@ -88,7 +99,7 @@ async fn served() -> Served {
         handle,
         site,
         dated,
-        secret: secret.unwrap().secret,
+        secret: opened.made.unwrap().secret,
         _folder: folder,
     }
 }
@@ -119,7 +130,19 @@ impl Served {
     /// Sends one request with these header lines; the Host is this device's address unless they
     /// name one.
     async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
-        let mut stream = TcpStream::connect(self.address).await.unwrap();
+        let stream = TcpStream::connect(self.address).await.unwrap();
+        self.asked(stream, method, path, headers, body).await
+    }
+
+    /// As [`Self::ask`], on a connection.
+    async fn asked(
+        &self,
+        mut stream: TcpStream,
+        method: &str,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: &str,
+    ) -> Answer {
         let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
         if !headers.iter().any(|(name, _)| *name == "Host") {
             text += &format!("Host: {}\r\n", self.address);
@@ -143,6 +166,14 @@ impl Served {
         }
     }
 
+    /// The status of the answer to a request from another address of this machine.
+    async fn from(&self, from: [u8; 4], method: &str, path: &str) -> u16 {
+        let socket = tokio::net::TcpSocket::new_v4().unwrap();
+        socket.bind((from, 0).into()).unwrap();
+        let stream = socket.connect(self.address).await.unwrap();
+        self.asked(stream, method, path, &[], "").await.status
+    }
+
     async fn get(&self, path: &str) -> Answer {
         self.ask("GET", path, &[], "").await
     }
@@ -161,7 +192,12 @@ impl Served {
     /// Signs in; the cookie.
     async fn sign_in(&self) -> String {
         let body = format!("{{\"secret\": \"{}\"}}", self.secret);
-        let answer = self.change("POST", "/api/session", "", &body).await;
+        self.sign_in_with(&body).await
+    }
+
+    /// Signs in with a body; the cookie.
+    async fn sign_in_with(&self, body: &str) -> String {
+        let answer = self.change("POST", "/api/session", "", body).await;
         assert_eq!(answer.status, 200, "{answer:?}");
         let cookie = answer.header("set-cookie").unwrap();
         cookie.split(';').next().unwrap().to_owned()

@@ -1,11 +1,12 @@
-//! The device's secret: configured, or made at the first start and stored as an argon2id hash.
+//! The device's secret: configured, or made at the first start and stored as an argon2id hash. The
+//! hashes of passwords and PINs are made and compared here as well.
 
 use crate::error::{Exit, Result};
-use crate::storage::folder::{read_whole, write_whole};
+use crate::storage::folder::{read_whole, write_whole_with};
 use argon2::Argon2;
 use argon2::password_hash::phc::{self, PasswordHash};
 use argon2::password_hash::{self, PasswordHasher, PasswordVerifier};
-use std::io::{self, ErrorKind};
+use std::io::{self, ErrorKind, Write as _};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
@@ -78,8 +79,7 @@ pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>)> {
     let unmade = Exit::CannotCreate;
     let secret = make().map_err(unmade.failure())?;
     let hash = hash(&secret).map_err(unmade.failure())?;
-    write_whole(file, format!("{hash}\n").as_bytes())
-        .and_then(|()| close_to_others(file))
+    write_closed(file, format!("{hash}\n").as_bytes())
         .map_err(unmade.advising("write secret", "free space"))?;
     Ok((hash, Some(NewSecret { secret, complaint })))
 }
@@ -105,12 +105,32 @@ fn read(file: &Path) -> Result<Option<String>> {
 /// # Errors
 /// If the stored hash cannot be read.
 pub(super) fn is_right(typed: &str, stored: &str) -> Result<bool, phc::Error> {
-    if typed.len() > LONGEST {
-        return Ok(false);
+    match typed.len() > LONGEST {
+        true => Ok(false),
+        false => is_password(&plain(typed), stored),
     }
+}
+
+/// Whether a text is the password or PIN with this hash, every character as it was typed.
+///
+/// # Errors
+/// If the stored hash cannot be read.
+pub(super) fn is_password(typed: &str, stored: &str) -> Result<bool, phc::Error> {
     let stored = PasswordHash::new(stored)?;
-    let verified = Argon2::default().verify_password(plain(typed).as_bytes(), &stored);
+    let verified = Argon2::default().verify_password(typed.as_bytes(), &stored);
     Ok(verified.is_ok())
+}
+
+/// How the hashes begin that this program makes: argon2id, 19 MiB, 2 passes, as OWASP recommends.
+const USUAL: &str = "$argon2id$v=19$m=19456,t=2,p=1$";
+
+/// A hash of nothing that anybody knows: a name that does not exist takes as long as one that does.
+pub(super) const OF_NOBODY: &str = "$argon2id$v=19$m=19456,t=2,p=1$hlBHoGKyB5RfsWs5ltyb4A$+p6WXw2SJXcsBeWlqZyVJmsCyZ2Cm5kURAC/2XwQ1ug";
+
+/// Whether a hash that comes from elsewhere may be used: one with other parameters could take all
+/// memory with each guess.
+pub(super) fn is_usual(hash: &str) -> bool {
+    hash.starts_with(USUAL) && PasswordHash::new(hash).is_ok()
 }
 
 fn make() -> Result<String, getrandom::Error> {
@@ -126,10 +146,16 @@ fn make() -> Result<String, getrandom::Error> {
 }
 
 fn hash(secret: &str) -> Result<String, password_hash::Error> {
-    // The crate's default: argon2id, 19 MiB, 2 passes, as OWASP recommends.
-    Argon2::default()
-        .hash_password(plain(secret).as_bytes())
-        .map(|hash| hash.to_string())
+    hash_password(&plain(secret))
+}
+
+/// The hash of a password or PIN.
+///
+/// # Errors
+/// If the system gives no random bits.
+pub(super) fn hash_password(password: &str) -> Result<String, password_hash::Error> {
+    let hash = Argon2::default().hash_password(password.as_bytes());
+    hash.map(|hash| hash.to_string())
 }
 
 /// The form that is hashed: only letters and digits, in capitals, with the letters that Crockford's
@@ -144,8 +170,15 @@ fn plain(typed: &str) -> String {
     .collect()
 }
 
-fn close_to_others(file: &Path) -> io::Result<()> {
-    std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o600))
+/// Writes a file whole that only this user may read.
+///
+/// # Errors
+/// Whatever the file system answers; then the old file stands.
+pub(super) fn write_closed(file: &Path, bytes: &[u8]) -> io::Result<()> {
+    write_whole_with(file, |new| {
+        new.set_permissions(std::fs::Permissions::from_mode(0o600))?;
+        new.write_all(bytes)
+    })
 }
 
 #[cfg(test)]
@@ -186,6 +219,18 @@ mod tests {
             let refused = given(&file).unwrap_err().to_string();
             assert!(refused.contains("give a new one"), "{text}: {refused}");
         }
+    }
+
+    #[test]
+    fn hashes_have_the_usual_parameters_and_others_are_not_used() {
+        let made = hash_password("correct horse battery").unwrap();
+        assert!(is_usual(&made) && is_usual(OF_NOBODY));
+        assert!(is_password("correct horse battery", &made).unwrap());
+        assert!(!is_password("Correct horse battery", &made).unwrap());
+        let greedy = made.replace("m=19456", "m=4194304");
+        assert!(
+            !is_usual(&greedy) && !is_usual("$argon2id$v=19$m=19456,t=2,p=1$") && !is_usual("")
+        );
     }
 
     #[test]
