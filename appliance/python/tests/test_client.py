@@ -157,6 +157,19 @@ class Client(unittest.TestCase):
         self.fails(fringed.Refused, "sign in", self.head.trigger)
         self.assertEqual(seen, [("fringed-session=A", self.url)] * 2)
 
+    def test_a_user_signs_in_by_name_and_not_again_where_a_role_is_missing(self):
+        for head, who in [(self.head, {}), (fringed.Head(self.url, "7K2QF", user="ada"), {"user": "ada"})]:
+            seen = []
+            self.answers["POST /api/session"] = [lambda request: (seen.append(json.loads(request.body)), request.send(
+                200, {}, Set_Cookie="fringed-session=A; Path=/"))]
+            self.answers[TRIGGER] = [(403, {"error": "this needs the role technician"})]
+            self.fails(fringed.Refused, "the role technician", head.trigger)
+            self.fails(fringed.Refused, "the role technician", head.trigger)
+            self.assertEqual(seen, [{"secret": "7K2QF", **who}])
+            self.answers[TRIGGER] = [(401, {"error": "sign in"})]
+            self.fails(fringed.Refused, "sign in", head.trigger)
+            self.assertEqual(seen, [{"secret": "7K2QF", **who}] * 2)
+
     def test_results_of_any_number_are_read_in_pages_and_little_memory(self):
         self.answers.update(history(100_000))
         ran = subprocess.run([sys.executable, "-c", ITERATE, self.url], check=True, capture_output=True, text=True)

@@ -23,8 +23,8 @@ class Unreachable(FringedError):
     remedy = "check network and address"
 
 class Refused(FringedError):
-    """The device does not accept the secret, or a change was requested without one."""
-    remedy = "open the head with its secret: Head(url, secret=...)"
+    """The device does not accept the secret, a change was requested without one, or its user may not make it."""
+    remedy = "open the head with a secret that allows it: Head(url, secret=..., user=...)"
 
 class Busy(FringedError):
     """Not possible in the present state of the station."""

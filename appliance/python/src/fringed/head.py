@@ -28,11 +28,11 @@ COLUMNS = [("seq", "i8"), ("time", "M8[us]"), ("recipe", "i4"), ("part_id", "u4"
 
 
 class Head:
-    """A head at `url`. Reading needs no `secret`; a change does. `timeout`: longest wait for an answer, s. Threads
-    may share a head."""
+    """A head at `url`. Reading needs no `secret`; a change does. `timeout`: longest wait for an answer, s. `user`:
+    whose secret it is; without it, that of the device. Threads may share a head."""
 
-    def __init__(self, url: str, secret: str | None = None, timeout: float = 10.0) -> None:
-        self._device = Device(url, secret, timeout)
+    def __init__(self, url: str, secret: str | None = None, timeout: float = 10.0, *, user: str | None = None) -> None:
+        self._device = Device(url, secret, timeout, user)
 
     def snapshot(self) -> dict[str, Any]:
         """The present state of the station."""

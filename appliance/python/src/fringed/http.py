@@ -25,14 +25,14 @@ GATEWAY = (502, 503, 504)
 class Device:
     """A device at an address. Each request has its own connection, so threads may share it."""
 
-    def __init__(self, url: str, secret: str | None, timeout: float) -> None:
+    def __init__(self, url: str, secret: str | None, timeout: float, user: str | None = None) -> None:
         parts = urlsplit(url)
         if parts.scheme not in KINDS or not parts.hostname or "@" in parts.netloc:
             raise ValueError(f"{url!r} is not the address of a head: write it like http://10.20.1.11")
         self._host, self._port, self._kind = parts.hostname, parts.port, KINDS[parts.scheme]
         # Origin and Host must name the same place, or the device refuses changes.
         self._url, self._place = f"{parts.scheme}://{parts.netloc}", parts.netloc
-        self._secret, self._cookie, self.timeout = secret, "", timeout
+        self._secret, self._user, self._cookie, self.timeout = secret, user, "", timeout
 
     def ask(self, method: str, path: str, body: Any = None, wait: float | None = None) -> Answer:
         """Sends a request, with `body` as JSON or as an open file. Signs in if it is a change and the session has
@@ -68,7 +68,8 @@ class Device:
     def _sign_in(self) -> None:
         if self._secret is None:
             raise Refused("a change needs the secret of the device")
-        with self._send("POST", "/api/session", {"secret": self._secret}, None).checked() as answer:
+        who = {"secret": self._secret} if self._user is None else {"user": self._user, "secret": self._secret}
+        with self._send("POST", "/api/session", who, None).checked() as answer:
             answer.object(answer.body())  # Else the cookie may not be whole.
             self._cookie = (answer.response.getheader("Set-Cookie") or "").partition(";")[0]
 
