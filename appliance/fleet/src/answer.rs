@@ -26,6 +26,18 @@ pub struct Header {
     pub first: Option<u32>,
     /// The newest.
     pub last: Option<u32>,
+    /// The ids that the history had before its head was restored from a backup.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub earlier: Vec<EarlierHistory>,
+}
+
+/// The results of a history up to a SEQ were kept under another id before.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub struct EarlierHistory {
+    /// That id.
+    pub history: String,
+    /// The last SEQ under it.
+    pub last: u32,
 }
 
 /// A result. Lengths in mm, angles in °, volumes in mm³, shares 0…1.

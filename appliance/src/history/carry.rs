@@ -10,12 +10,11 @@ use super::spool::Spool;
 use super::writer::Writer;
 use super::{DATABASE, HistoryError, HistoryResult, beyond, is_after, schema, shown_of};
 use crate::storage::state::{Counted, StateFolder};
-use rusqlite::backup::Backup;
+use rusqlite::backup::{Backup, StepResult};
 use rusqlite::{Connection, OpenFlags, OptionalExtension as _};
 use serde::Serialize;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
-use std::time::Duration;
 
 /// Pages of the database that are copied at a time: all, as a writer between two pieces would have the
 /// copy begin anew.
@@ -54,9 +53,16 @@ impl Reader {
         copy.pragma_update(None, "synchronous", false)
             .map_err(failed)?;
         let backup = Backup::new(&source, &mut copy).map_err(failed)?;
-        let copied = backup.run_to_completion(ALL_PAGES, Duration::ZERO, None);
-        copied.map_err(failed)?;
-        drop(backup);
+        match backup.step(ALL_PAGES).map_err(failed)? {
+            StepResult::Done => drop(backup),
+            _ => {
+                return Err(HistoryError {
+                    path: target.to_path_buf(),
+                    reason: "another program holds the history: try again".into(),
+                    aside: None,
+                });
+            }
+        }
         // One file alone, without a log beside it.
         let alone = copy.pragma_update_and_check(None, "journal_mode", "delete", |_| Ok(()));
         alone.map_err(failed)

@@ -2,7 +2,7 @@
 
 use super::Tally;
 use super::lines::{Lines, Trouble};
-use crate::answer::{Header, LIFE, Row, Wrong};
+use crate::answer::{EarlierHistory, Header, LIFE, Row, Wrong};
 use crate::config::{Config, HeadConfig};
 use crate::http::{Client, shortened};
 use crate::log::{self, Severity};
@@ -142,9 +142,14 @@ impl Poll {
         } else if self.state.serial != header.serial {
             return Err(Wrong::Serial(header.serial, self.state.serial.clone()).into());
         }
-        if base(&self.state.history) != header.history {
+        let restored = self.state.seq == 0 && !header.earlier.is_empty();
+        if base(&self.state.history) != header.history || restored {
+            // What was fetched under an id before is not fetched again.
+            let fetched = header.earlier.iter().map(|earlier| self.fetched(earlier));
+            let fetched = fetched.max().unwrap_or(0);
             self.state.history = self.plant.newest_life(&header.serial, &header.history);
-            self.state.seq = self.plant.end(&header.serial, &self.state.history);
+            let end = self.plant.end(&header.serial, &self.state.history);
+            self.state.seq = end.max(fetched);
             if self.state.seq != after {
                 // The answer is about what is behind a SEQ of another history.
                 self.client.close();
@@ -179,6 +184,19 @@ impl Poll {
             true => Asked::All,
             false => Asked::More,
         })
+    }
+
+    /// The last SEQ that was fetched of a history that a head has under another id now.
+    fn fetched(&self, earlier: &EarlierHistory) -> u32 {
+        let seq = match base(&self.state.history) == earlier.history {
+            true => self.state.seq,
+            false => {
+                let serial = &self.state.serial;
+                let newest = self.plant.newest_life(serial, &earlier.history);
+                self.plant.end(serial, &newest)
+            }
+        };
+        seq.min(earlier.last)
     }
 
     /// Numbers of a history went back to `last`, as those of an image of a card that was restored do:

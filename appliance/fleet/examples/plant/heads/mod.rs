@@ -234,6 +234,7 @@ impl Head {
             history: self.history(),
             first: self.results(1).next(),
             last: self.newest().next(),
+            earlier: Vec::new(),
         }
     }
 
