@@ -6,6 +6,13 @@ use hal::npy::Array;
 use std::io::Cursor;
 use std::path::Path;
 
+/// SHA-256 in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    use sha2::Digest as _;
+    let hash = sha2::Sha256::digest(bytes);
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// The manifest and the arrays of a recipe's file, to be changed and packed again.
 pub fn recipe(bytes: &[u8]) -> (RecipeFile, Arrays) {
     unpack(Cursor::new(bytes), bytes.len() as u64).expect("a whole recipe")

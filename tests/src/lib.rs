@@ -13,6 +13,7 @@
 
 pub use scenes::{board, once, oracle, plane, random, render, rig};
 
+pub mod archives;
 pub mod files;
 pub mod fuzz;
 pub mod imports;

@@ -80,7 +80,7 @@ fn place() -> Place {
 }
 
 /// Selects a recipe by number or by part number, waits for the answer, and returns RECIPE_RESULT.
-fn select(plc: &mut Plc, number: u16, by_part_number: bool) -> u16 {
+pub fn select(plc: &mut Plc, number: u16, by_part_number: bool) -> u16 {
     let mut fields = vec![ONLINE | RECIPE_LOAD, 0, number, 0, 0, 0, 0, 0];
     if by_part_number {
         fields[2] = BY_PART_NUMBER;

@@ -1,8 +1,10 @@
 //! The integration suite: one binary, one module per topic.
 
+mod access;
 mod adapt;
 mod among;
 mod any_list;
+mod backups;
 mod bad_input;
 mod bench;
 mod better_direction;

@@ -16,7 +16,7 @@ const FAIL: u16 = 2;
 /// A client like a browser: one request per connection, and a cookie.
 pub struct Browser {
     address: SocketAddr,
-    cookie: String,
+    pub cookie: String,
 }
 
 impl Browser {
