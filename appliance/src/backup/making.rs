@@ -17,6 +17,7 @@ use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 use zip::ZipWriter;
 use zip::result::ZipError;
 
@@ -28,6 +29,10 @@ const MOST_BYTES: u64 = (4 << 30) - (64 << 20);
 const ATTEMPTS: usize = 5;
 /// Bytes that are copied at a time.
 const PIECE: usize = 256 << 10;
+/// After each piece there is a rest of so many times the work on it, so that a cycle beside it has the
+/// cores and the memory, but not longer than this: a slow client has made it wait already.
+const REST: u32 = 3;
+const LONGEST_REST: Duration = Duration::from_millis(10);
 
 /// What a backup has beside recipes, calibration, history and record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -280,11 +285,12 @@ impl StateSnapshot {
     }
 }
 
-/// Copies to the end; answers with the bytes and their hash.
+/// Copies to the end, with rests; answers with the bytes and their hash.
 pub(super) fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(u64, String)> {
     let mut hash = Sha256::new();
     let (mut bytes, mut piece) = (0, vec![0; PIECE]);
     loop {
+        let begun = Instant::now();
         let read = from.read(&mut piece)?;
         if read == 0 {
             return Ok((bytes, hex(&hash.finalize())));
@@ -292,5 +298,8 @@ pub(super) fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(u64
         hash.update(&piece[..read]);
         to.write_all(&piece[..read])?;
         bytes += read as u64;
+        if read == PIECE {
+            std::thread::sleep((begun.elapsed() * REST).min(LONGEST_REST));
+        }
     }
 }

@@ -59,6 +59,8 @@ pub(super) async fn make(site: Site, Query(wanted): Query<Wanted>) -> Answered<R
             Ok(snapshot) => {
                 if begun.send(Ok(())).is_ok() {
                     to.most = LARGE_CHUNK;
+                    // The locks are free again: from here on only idle cores work.
+                    computing::stand_back();
                     let written = snapshot.write(&mut to).map_err(io::Error::other);
                     to.end(written);
                 }
@@ -97,7 +99,7 @@ pub(super) async fn check(site: Site, request: Request) -> Answered<Json<Value>>
     let upload = request::file(&site, request, folder, request::BACKUP).await?;
     let failed = "checking the backup failed; see the log";
     let checking = site.clone();
-    let checked = alone("checking", failed, move || {
+    let checked = alone("checking a backup", failed, move || {
         computing::give_way();
         let _turn = turn;
         checked(&checking, upload.file.path())

@@ -3,6 +3,7 @@
 //!
 //! `tests/fuzz` calls them under libFuzzer; the suite calls them with the inputs stored there.
 
+mod backup;
 mod folder;
 mod head;
 mod page;
@@ -15,12 +16,13 @@ mod study;
 pub type Target = fn(&[u8]);
 
 /// All targets with their names, which are also the names of the folders of their inputs.
-pub const TARGETS: [(&str, Target); 14] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("npy", folder::npy),
     ("png_frame", folder::png_frame),
     ("recording", folder::recording),
     ("recipe_zip", recipe::zip),
     ("recipe_json", recipe::json),
+    ("backup", backup::archive),
     ("edit", recipe::edit),
     ("gauges_toml", recipe::gauges_toml),
     ("calibration", head::calibration),
