@@ -1,5 +1,5 @@
 // The head: its live picture, its set-up step by step, and its drift.
-import { $, fill, show, text } from "./element.js";
+import { $, fill, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { moment } from "./number.js";
 import { trend } from "./trend.js";
@@ -14,7 +14,7 @@ let visible = false;
 
 // Whether camera and projector are still where they were calibrated, by the last checks.
 function showDrift(drift) {
-  show("drift", Boolean(drift));
+  show("drift", drift);
   if (!drift) return;
   const when = drift.at_unix_s ? ` Checked ${moment({ utc_us: 1e6 * drift.at_unix_s })}.` : "";
   const off = `${drift.epipolar_px.toFixed(2)} px off their epipolar lines, limit ${drift.limit_px.toFixed(2)} px`;
@@ -72,6 +72,6 @@ export function start() {
   startLive();
   startSteps();
   startGeometry();
-  window.addEventListener("head", refresh);
+  on(window, "head", refresh);
   if (!location.hash) lead().catch(() => {});
 }

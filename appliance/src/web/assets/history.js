@@ -1,5 +1,5 @@
 // Stored results, filtered, a page at a time.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, cells, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { openKept } from "./kept.js";
 import { about, count, milliseconds, moment } from "./number.js";
@@ -44,16 +44,13 @@ function row(entry) {
     const link = make("a", "", "ZIP");
     link.href = `api/history/${entry.seq}/recording.zip`;
     link.setAttribute("download", "");
-    link.setAttribute("aria-label", `ZIP: frames of no. ${entry.seq}`);
-    frames.append(link);
+    frames.append(label(link, `ZIP: frames of no. ${entry.seq}`));
   }
   const verdict = make("span", `tag ${entry.verdict.toLowerCase()}`, entry.verdict);
-  const open = button(String(entry.seq), "open", () => openKept(entry.seq, boot));
-  open.setAttribute("aria-label", `show no. ${entry.seq}`);
+  const open = label(button(String(entry.seq), "open", () => openKept(entry.seq, boot)), `show no. ${entry.seq}`);
   const when = make("td", "nowrap", moment(entry, boot));
   when.title = about(entry);
-  return make("tr", "", make("td", "", open), when, make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
-    make("td", "", verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
+  return make("tr", "", ...cells(open), when, ...cells(`${entry.recipe}`, String(entry.part_id), verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
 }
 
 async function load(more) {
@@ -92,7 +89,7 @@ export function listRange(recipe, keys, words) {
 }
 
 function range() {
-  show("filter-range", Boolean(chosen));
+  show("filter-range", chosen);
   text("filter-range-words", chosen ? `from the chart: ${chosen.words}` : "");
 }
 
@@ -105,8 +102,8 @@ export function openHistory(visible, now) {
 }
 
 export function start() {
-  $("filter").addEventListener("submit", (event) => { event.preventDefault(); load(false); });
-  $("filter-range-drop").addEventListener("click", () => { chosen = null; range(); load(false); });
-  $("history-more").addEventListener("click", () => load(true));
-  window.addEventListener("dated", () => { if (seen) load(false); });
+  on($("filter"), "submit", () => load(false));
+  on($("filter-range-drop"), "click", () => { chosen = null; range(); load(false); });
+  on($("history-more"), "click", () => load(true));
+  on(window, "dated", () => { if (seen) load(false); });
 }

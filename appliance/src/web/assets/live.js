@@ -1,5 +1,5 @@
 // The live picture of the head: each is asked for when the one before is shown, so nothing is exposed unless somebody looks.
-import { $, draw, fill, make, show, text } from "./element.js";
+import { $, draw, fill, make, on, show, text } from "./element.js";
 import { ask, picture } from "./api.js";
 import { signed } from "./number.js";
 import { change, isSignedIn, notice, open, refresh } from "./session.js";
@@ -138,7 +138,7 @@ function stop(words) {
   state.shown = [];
   text("live-rate", "");
   text("live-words", words);
-  show("live-words", Boolean(words));
+  show("live-words", words);
 }
 
 async function follow() {
@@ -182,11 +182,11 @@ export function openLive(visible, busy = "") {
 }
 
 export function start() {
-  document.addEventListener("visibilitychange", follow);
-  window.addEventListener("session", follow);
-  $("live-sign").addEventListener("click", () => open(null));
-  for (const field of $("live-form").querySelectorAll(".exposing")) field.addEventListener("input", () => { state.edited = true; });
-  $("live-form").addEventListener("submit", (event) => { event.preventDefault(); expose(false); });
-  $("live-outline").addEventListener("change", () => { $("live-volume").toggleAttribute("hidden", !$("live-outline").checked); });
-  $("live-keep").addEventListener("click", () => expose(true));
+  on(document, "visibilitychange", follow);
+  on(window, "session", follow);
+  on($("live-sign"), "click", () => open(null));
+  for (const field of $("live-form").querySelectorAll(".exposing")) on(field, "input", () => { state.edited = true; });
+  on($("live-form"), "submit", () => expose(false));
+  on($("live-outline"), "change", () => { $("live-volume").toggleAttribute("hidden", !$("live-outline").checked); });
+  on($("live-keep"), "click", () => expose(true));
 }

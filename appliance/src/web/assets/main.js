@@ -1,5 +1,5 @@
 // The page: follows the snapshots, and shows each in the view that is open.
-import { $, show, text } from "./element.js";
+import { $, on, show, text } from "./element.js";
 import { follow } from "./stale.js";
 import { isHeld, isOfOtherRecipe, showVerdict } from "./verdict.js";
 import { showGauges } from "./gauges.js";
@@ -58,7 +58,7 @@ function showSnapshot(now) {
   show("refusal", waiting);
   text("refusal", waiting ? `No trigger is accepted: ${now.refusal.words}.` : "");
   $("trigger").disabled = !now.ready;
-  show("fault", Boolean(now.fault));
+  show("fault", now.fault);
   if (now.fault) {
     text("fault-code", `${now.fault.code} · ${now.fault.family}`);
     text("fault-cause", now.fault.cause);
@@ -120,9 +120,9 @@ startStatistics();
 startReport(() => last);
 startStudies();
 startHead();
-$("trigger").addEventListener("click", () => change(() => ask("POST", "api/trigger")));
-$("reset").addEventListener("click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
-window.addEventListener("hashchange", openView);
-window.addEventListener("recipes", list);
+on($("trigger"), "click", () => change(() => ask("POST", "api/trigger")));
+on($("reset"), "click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
+on(window, "hashchange", openView);
+on(window, "recipes", list);
 openView();
 follow(showSnapshot);

@@ -1,5 +1,5 @@
 // Signing in and out. Looking needs neither.
-import { $, show, text } from "./element.js";
+import { $, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 
 let signedIn = false;
@@ -56,13 +56,12 @@ export async function change(act, done) {
 
 export function start() {
   refresh();
-  $("sign").addEventListener("click", async () => {
+  on($("sign"), "click", async () => {
     if (!signedIn) { open(null); return; }
     try { await ask("DELETE", "api/session"); } finally { await refresh(); }
   });
-  $("sign-cancel").addEventListener("click", () => show("sign-in", false));
-  $("sign-in").addEventListener("submit", async (event) => {
-    event.preventDefault();
+  on($("sign-cancel"), "click", () => show("sign-in", false));
+  on($("sign-in"), "submit", async () => {
     try {
       // The device uses the time if its own clock is not synchronised.
       const { time } = await ask("POST", "api/session", { secret: $("secret").value, time_ms: Date.now() });

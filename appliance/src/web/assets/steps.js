@@ -1,5 +1,5 @@
 // The steps from a bare head to the first recipe: each can be run, and says what it found and what to do.
-import { $, fill, make, show, text } from "./element.js";
+import { $, fill, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 import { moment } from "./number.js";
@@ -94,21 +94,21 @@ function furnish(name, at) {
   summary.append(make("span", "state", tick, " ", make("span", "is")));
   const act = place.lastElementChild;
   act.className = "strong";
-  act.addEventListener("click", () => run(name));
+  on(act, "click", () => run(name));
   const bar = make("progress", "bar");
   bar.max = 1;
   bar.setAttribute("aria-label", `how far ${title(name)} is`);
   const end = make("button", "end", "Stop this step");
   end.type = "button";
   end.hidden = true;
-  end.addEventListener("click", () => change(() => ask("DELETE", `api/head/steps/${name}`)));
+  on(end, "click", () => change(() => ask("DELETE", `api/head/steps/${name}`)));
   for (const part of [make("ul", "said"), make("p", "remedy"), bar, make("p", "now quiet"), end]) place.insertBefore(part, act);
   place.append(make("span", "at quiet"));
 }
 
 export function start() {
   NAMES.forEach(furnish);
-  $("bare-next").addEventListener("click", () => {
+  on($("bare-next"), "click", () => {
     const place = $(`step-${state.next}`);
     place.open = true;
     place.querySelector("summary").focus({ preventScroll: true });
