@@ -4,10 +4,12 @@ import { ask } from "./api.js";
 import { quantity } from "./number.js";
 import { decided, tag } from "./verdict.js";
 import { state } from "./editor-list.js";
+import { isBarred, needed } from "./session.js";
 
 // A change is tried when nothing was changed for so long, ms. A try on parts has so many of them.
 const PAUSE = 300;
 const PARTS = 20;
+const TRY = "POST /api/recipes/{number}/try";
 let timer = 0, turn = 0, onParts = 0, hooks = null;
 
 // The list as a request has it.
@@ -42,6 +44,7 @@ function take(answer) {
 export async function tryNow() {
   clearTimeout(timer);
   timer = 0;
+  if (isBarred(TRY)) { text("editor-state", `To try it ${needed(TRY)}.`); return true; }
   const mine = turn += 1, { number } = state.recipe;
   try {
     const answer = await send({});

@@ -61,13 +61,19 @@ export function on(element, kind, act, options) {
   }, options);
 }
 
+// Disables an element for a reason of its own; one that the role may not use (`data-role`) stays disabled.
+export function disable(element, yes) {
+  element.held = yes;
+  element.disabled = yes || Boolean(element.dataset.role);
+}
+
 // A button that does something; it is disabled until that has ended.
 export function button(words, kind, act) {
   const made = make("button", kind, words);
   made.type = "button";
   on(made, "click", async () => {
-    made.disabled = true;
-    try { await act(); } finally { made.disabled = false; }
+    disable(made, true);
+    try { await act(); } finally { disable(made, false); }
   });
   return made;
 }

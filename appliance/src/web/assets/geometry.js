@@ -1,7 +1,7 @@
 // The poses of the board: takes, shows and forgets them, and says which are missing.
-import { $, button, fill, label, make, on, show, text } from "./element.js";
+import { $, button, disable, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change } from "./session.js";
+import { change, needs } from "./session.js";
 import { choose } from "./question.js";
 import { showPicture } from "./live.js";
 import { place } from "./simulation.js";
@@ -63,7 +63,8 @@ function row(pose, busy) {
   const { number, usable, problem } = pose;
   const look = button(`Pose ${number}`, "open", () => { state.chosen = number; showPose(); });
   const forget = label(button("Forget", "", () => send({ action: "forget", pose: number })), `Forget pose ${number}`);
-  forget.disabled = busy;
+  needs(forget, "POST /api/head/steps/{name}");
+  disable(forget, busy);
   const words = make("div", "", make("span", usable ? "" : "bad", usable ? "✓ can be used" : `✗ cannot be used: ${problem}`), make("small", "", figures(pose)));
   const line = make("li", "", look, words, forget);
   line.dataset.pose = number;
@@ -142,6 +143,6 @@ export function start() {
     ["empty-place", () => ({ part: "empty" }), "the part is taken away"],
   ];
   for (const [id, wanted, words] of putters) {
-    on($(id), "click", () => place(wanted(), words));
+    on(needs($(id), "PUT /api/simulation/part"), "click", () => place(wanted(), words));
   }
 }

@@ -63,9 +63,12 @@ export function openHead(open) {
 }
 
 // A first visit to a head that is not calibrated starts with its set-up.
-async function lead() {
-  const { open, calibrated } = await ask("GET", "api/head");
-  if (open && !calibrated && !location.hash) location.replace("#head");
+export async function lead() {
+  if (location.hash) return;
+  try {
+    const { open, calibrated } = await ask("GET", "api/head");
+    if (open && !calibrated && !location.hash) location.replace("#head");
+  } catch (gone) { /* The live view says so. */ }
 }
 
 export function start() {
@@ -73,5 +76,4 @@ export function start() {
   startSteps();
   startGeometry();
   on(window, "head", refresh);
-  if (!location.hash) lead().catch(() => {});
 }

@@ -1,7 +1,7 @@
 // The recipes: list, load, teach and compare, export, import, delete and undo.
 import { $, button, cells, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change, notice } from "./session.js";
+import { change, needs, notice } from "./session.js";
 import { choose } from "./question.js";
 import { edit } from "./editor.js";
 import { showPart, start as startPart } from "./part.js";
@@ -36,7 +36,7 @@ function row(recipe) {
   const own = number === active;
   return make("tr", own ? "active" : "", ...cells(String(number), recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : ""), recipe.part_number,
     make("code", "", recipe.fingerprint.slice(0, 8)), String(recipe.frames), String(recipe.gauges), day(recipe.taught_at_unix_s)),
-  make("td", "actions", use, act("Edit", () => edit(number)), gain, twin, take, remover(recipe)));
+  make("td", "actions", needs(use, "POST /api/recipes/{number}/load"), act("Edit", () => edit(number)), gain, needs(twin, "POST /api/recipes"), take, remover(recipe)));
 }
 
 // Stores a recipe once more under the first number that is free, for a variant of the part.
@@ -68,7 +68,7 @@ function remover(recipe) {
       list();
     });
   });
-  return label(remove, `Delete recipe ${recipe.number}`);
+  return needs(label(remove, `Delete recipe ${recipe.number}`), "DELETE /api/recipes/{number}");
 }
 
 // A line below a recipe, or in place of a deleted one, that restores the previous version.
@@ -81,7 +81,7 @@ function undoer(number, before, words) {
     else notice(`recipe ${number} · ${now.name} is back${now.loading ? " and is being loaded" : ""}: its ${crc}`);
     list();
   }));
-  const place = make("td", "", undo);
+  const place = make("td", "", needs(undo, "POST /api/recipes/{number}/undo"));
   place.colSpan = 7;
   return make("tr", "before", make("td", "", before.deleted ? String(number) : ""), place);
 }

@@ -1,5 +1,5 @@
 // The part in front of a simulated head: shows it, and replaces it.
-import { $, button, fill, label, make, on, show, text } from "./element.js";
+import { $, button, disable, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 
@@ -153,7 +153,7 @@ export function start() {
     showDefects();
   });
   on($("simulation"), "submit", async () => {
-    $("part-put").disabled = true;
-    try { await put(); } finally { $("part-put").disabled = false; }
+    disable($("part-put"), true);
+    try { await put(); } finally { disable($("part-put"), false); }
   });
 }

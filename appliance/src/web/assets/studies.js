@@ -1,7 +1,7 @@
 // Guided studies: begins one, asks for part, appraiser and trial one after the other, and shows the report.
 import { $, button, cells, fill, heading, label, make, on, scrolling, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change, notice } from "./session.js";
+import { change, needs, notice } from "./session.js";
 import { choose } from "./question.js";
 import { quantity } from "./number.js";
 
@@ -21,7 +21,7 @@ async function list() {
     const look = label(button(String(study.number), "open", () => openStudy(study.number)), `open study ${study.number}`);
     const drop = label(button("Delete", "", () => change(() => remove(study))), `Delete study ${study.number}`);
     const words = study.error ? [study.error, "", ""] : [study.name, String(study.recipe), `${study.taken} of ${study.all}`];
-    return make("tr", "", ...cells(look, ...words), make("td", "actions", drop));
+    return make("tr", "", ...cells(look, ...words), make("td", "actions", needs(drop, "DELETE /api/studies/{number}")));
   }));
 }
 
@@ -69,7 +69,7 @@ function cell(study, of, words) {
   if (!taken) return make("td", now ? "now" : "", now ? "next" : "·");
   const again = label(button(String(taken.seq), "open", () => change(() => run(of))), `result ${taken.seq}: take ${words} again`);
   again.title = "take this trial again";
-  return make("td", now ? "now" : "", again);
+  return make("td", now ? "now" : "", needs(again, "POST /api/studies/{number}/{name}"));
 }
 
 function table(study) {
