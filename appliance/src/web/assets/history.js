@@ -12,10 +12,17 @@ let seen = false;
 // What a chart has chosen, in place of dates.
 let chosen = null;
 
-// The beginning of the chosen day in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
-function day(id, more) {
-  const [year, month, date] = $(id).value.split("-").map(Number);
+// The beginning of the day of a field in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
+function day(value, more) {
+  const [year, month, date] = value.split("-").map(Number);
   return 1000 * Math.max(0, new Date(year, month - 1, date + more).getTime());
+}
+
+// Adds the days of a filter to a query.
+export function setDays(wanted, id) {
+  const [from, to] = [$(`${id}-from`).value, $(`${id}-to`).value];
+  if (from) wanted.set("since_us", day(from, 0));
+  if (to) wanted.set("until_us", day(to, 1));
 }
 
 function filter() {
@@ -27,8 +34,7 @@ function filter() {
     for (const key of Object.keys(chosen.keys)) wanted.set(key, chosen.keys[key]);
     return wanted;
   }
-  if ($("filter-from").value) wanted.set("since_us", day("filter-from", 0));
-  if ($("filter-to").value) wanted.set("until_us", day("filter-to", 1));
+  setDays(wanted, "filter");
   return wanted;
 }
 

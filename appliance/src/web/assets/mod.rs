@@ -96,5 +96,6 @@ assets! {
         "steps.js"
         "geometry.js"
         "registers.js"
+        "changes.js"
         "journal.js";
 }
