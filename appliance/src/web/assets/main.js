@@ -10,6 +10,7 @@ import { start as startEditor } from "./editor.js";
 import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
 import { start as startChanges } from "./changes.js";
+import { openUsers, start as startUsers } from "./users.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { openStatistics, start as startStatistics } from "./statistics.js";
 import { start as startReport } from "./report.js";
@@ -92,7 +93,7 @@ function showSnapshot(now) {
 
 function openLists(now) {
   for (const open of [openHistory, openStatistics, openStudies]) open(view === "history", now);
-  openDevice(view === "device", now);
+  for (const open of [openDevice, openUsers]) open(view === "device", now);
 }
 
 function openView() {
@@ -142,6 +143,7 @@ startReport(() => last);
 startStudies();
 startHead();
 startChanges();
+startUsers();
 on($("trigger"), "click", () => change(() => ask("POST", "api/trigger")));
 on($("reset"), "click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
 on(window, "hashchange", openView);

@@ -97,5 +97,6 @@ assets! {
         "geometry.js"
         "registers.js"
         "changes.js"
+        "users.js"
         "journal.js";
 }

@@ -3,7 +3,7 @@ import { $, disable, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 
 // Each may do what those before it may.
-const ROLES = ["viewer", "operator", "technician", "engineer"];
+export const ROLES = ["viewer", "operator", "technician", "engineer"];
 // Who signs in with the secret of the device.
 const OWNER = "engineer";
 let session = { signed_in: false, user: null, role: ROLES[0], looking: "anyone", needs: {} };
@@ -18,6 +18,8 @@ const one = (role) => `${/^[aeo]/.test(role) ? "an" : "a"} ${role}`;
 export const isSignedIn = () => session.signed_in;
 // Whether nothing is shown before somebody signs in.
 export const isLocked = () => !session.signed_in && session.looking === "signed-in";
+// "anna (operator)" where a user of the list is signed in, else nothing.
+export const account = () => (session.signed_in && session.user !== OWNER ? `${session.user} (${session.role})` : "");
 
 // Whether the role that is signed in is too low for a request, which the device names: "POST /api/trigger". While nobody is signed in,
 // a click asks to sign in.
@@ -76,8 +78,10 @@ export function open(next) {
   window.scrollTo(0, 0);
 }
 
-// Does something that needs a session: asks to sign in first if there is none, and shows the outcome.
-export async function change(act, done) {
+// Does something that needs a session: asks to sign in first if there is none, and shows the outcome. Why it failed is said as a notice,
+// or in the element `place`.
+export async function change(act, done, place) {
+  const say = (words) => (place ? text(place, words) : notice(words, true));
   const attempt = async () => {
     try {
       const answer = await act();
@@ -87,7 +91,7 @@ export async function change(act, done) {
       if (error.status === 401) {
         mark({ ...session, signed_in: false, user: null, role: ROLES[0] });
         open(attempt);
-      } else notice(error.message, true);
+      } else say(error.message);
       return undefined;
     }
   };
