@@ -11,6 +11,7 @@ import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
 import { start as startChanges } from "./changes.js";
 import { openUsers, start as startUsers } from "./users.js";
+import { openBackup, start as startBackup } from "./backup.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { openStatistics, start as startStatistics } from "./statistics.js";
 import { start as startReport } from "./report.js";
@@ -93,7 +94,7 @@ function showSnapshot(now) {
 
 function openLists(now) {
   for (const open of [openHistory, openStatistics, openStudies]) open(view === "history", now);
-  for (const open of [openDevice, openUsers]) open(view === "device", now);
+  for (const open of [openDevice, openUsers, openBackup]) open(view === "device", now);
 }
 
 function openView() {
@@ -144,6 +145,7 @@ startStudies();
 startHead();
 startChanges();
 startUsers();
+startBackup();
 on($("trigger"), "click", () => change(() => ask("POST", "api/trigger")));
 on($("reset"), "click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
 on(window, "hashchange", openView);

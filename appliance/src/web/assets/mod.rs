@@ -98,5 +98,6 @@ assets! {
         "registers.js"
         "changes.js"
         "users.js"
+        "backup.js"
         "journal.js";
 }
