@@ -33,9 +33,10 @@ function row(recipe) {
   take.href = `api/recipes/${number}/file`;
   take.setAttribute("download", "");
   const twin = act("Copy", () => change(() => copy(number)));
-  const own = number === active;
+  const own = number === active, taught = make("td", "", day(recipe.taught_at_unix_s));
+  if (recipe.made_by) taught.append(make("small", "", `by ${recipe.made_by}`));
   return make("tr", own ? "active" : "", ...cells(String(number), recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : ""), recipe.part_number,
-    make("code", "", recipe.fingerprint.slice(0, 8)), String(recipe.frames), String(recipe.gauges), day(recipe.taught_at_unix_s)),
+    make("code", "", recipe.fingerprint.slice(0, 8)), String(recipe.frames), String(recipe.gauges)), taught,
   make("td", "actions", needs(use, "POST /api/recipes/{number}/load"), act("Edit", () => edit(number)), gain, needs(twin, "POST /api/recipes"), take, remover(recipe)));
 }
 
@@ -86,10 +87,10 @@ function undoer(number, before, words) {
   return make("tr", "before", make("td", "", before.deleted ? String(number) : ""), place);
 }
 
-// "the version of 2026-11-21 (a1b2c3d4, 4 gauges)"
+// "the version of 2026-11-21 (a1b2c3d4, 4 gauges) by anna (technician)"
 function version(recipe) {
   const when = recipe.taught_at_unix_s ? ` of ${day(recipe.taught_at_unix_s)}` : "";
-  return `the version${when} (${recipe.fingerprint.slice(0, 8)}, ${recipe.gauges} gauges)`;
+  return `the version${when} (${recipe.fingerprint.slice(0, 8)}, ${recipe.gauges} gauges)${recipe.made_by ? ` by ${recipe.made_by}` : ""}`;
 }
 
 function rows(recipe) {
