@@ -3,6 +3,7 @@
 // With a third argument it also takes screenshots for the documentation, into that folder. With the word "full" a study has 90 trials.
 import { strict as assert } from "node:assert";
 import { chromium } from "playwright-core";
+import { access } from "./access.js";
 import { Daemon, Place } from "./daemon.js";
 import { editor } from "./editor.js";
 import { forms } from "./forms.js";
@@ -435,6 +436,7 @@ try {
   await part({ browser, program, step, folder });
   await statistics({ browser, program, step, folder });
   await studies({ browser, program, step, folder, full: process.argv.includes("full") });
+  await access({ browser, program, step, folder });
   await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));
   console.log("the page does what it promises");

@@ -56,7 +56,7 @@ export async function recipes({ page, step, verdict, trigger }) {
     const versions = [await recipe(1)];
     for (const turn of [0, 1]) {
       const undo = page.locator("#recipe-rows tr.before button").first();
-      assert.match(await undo.textContent(), /^Undo: bring back the version .*\([0-9a-f]{8}, \d+ gauges\)$/);
+      assert.match(await undo.textContent(), /^Undo: bring back the version .*\([0-9a-f]{8}, \d+ gauges\)( by .+)?$/);
       const wanted = /\(([0-9a-f]{8}),/.exec(await undo.textContent())[1];
       await undo.click();
       await notice(`RECIPE_CRC32 is 0x${wanted.toUpperCase()}`);

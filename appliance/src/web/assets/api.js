@@ -7,6 +7,9 @@ async function failure(response) {
   error.status = response.status;
   error.taken = content && content.taken;
   error.why = content && content.why;
+  error.role = content && content.role;
+  // The session has ended, or its user has another role now.
+  if (error.status === 401 || error.role) window.dispatchEvent(new Event("refused"));
   return error;
 }
 

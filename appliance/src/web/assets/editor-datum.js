@@ -1,5 +1,5 @@
 // The dialogue for a datum system: its features in order, and a drawing of the axes that they make.
-import { $, draw, fill, make, show, text } from "./element.js";
+import { $, draw, fill, make, on, show, text } from "./element.js";
 import { alter, foundOf, free, state } from "./editor-list.js";
 import { outline } from "./editor-shapes.js";
 import { pixel } from "./editor-picture.js";
@@ -136,9 +136,9 @@ function keys(event) {
 }
 
 export function start() {
-  for (const letter of LETTERS) $(`datum-${letter}`).addEventListener("change", () => offer(wanted()));
-  $("datum-form").addEventListener("submit", use);
-  $("datum-cancel").addEventListener("click", close);
-  $("datum").addEventListener("keydown", keys);
-  $("datum-add").addEventListener("click", () => openDatum());
+  for (const letter of LETTERS) on($(`datum-${letter}`), "change", () => offer(wanted()));
+  on($("datum-form"), "submit", use);
+  on($("datum-cancel"), "click", close);
+  on($("datum"), "keydown", keys);
+  on($("datum-add"), "click", () => openDatum());
 }

@@ -1,11 +1,11 @@
 // Fields of the editor's forms, made from the table of kinds. A field that holds no number changes nothing, and says what it may be.
-import { make } from "./element.js";
+import { make, on } from "./element.js";
 import { LONGEST, alter, naming, pause, spoken, state } from "./editor-list.js";
 
 // An input with its words above it, and a name for programs that read the page.
 export function labelled(words, input, name, about) {
   input.setAttribute("aria-label", name || words);
-  input.addEventListener("change", pause);
+  on(input, "change", pause);
   if (about) input.title = about;
   return make("label", "", make("span", "", words), input);
 }
@@ -21,7 +21,7 @@ export function number(words, name, value, of, set) {
   input.value = known(value) ? String(Number((value * factor).toPrecision(7))) : "";
   if (optional) input.placeholder = "none";
   const called = unit ? `${name} in ${unit}` : name;
-  input.addEventListener("input", () => {
+  on(input, "input", () => {
     input.setCustomValidity("");
     const { validity } = input;
     const range = known(low) && known(most) ? ` from ${low} to ${most}` : known(low) ? ` from ${low} up` : "";
@@ -36,7 +36,7 @@ export function number(words, name, value, of, set) {
 export function select(words, name, value, options, set, about) {
   const input = make("select", "", ...options.map(([label, of]) => new Option(label, of)));
   input.value = value;
-  input.addEventListener("change", () => set(input.value));
+  on(input, "change", () => set(input.value));
   return labelled(words, input, name, about);
 }
 
@@ -44,7 +44,7 @@ export function select(words, name, value, options, set, about) {
 export function nameField(what, one) {
   const input = make("input"), places = naming(what, one);
   Object.assign(input, { value: one.name, maxLength: LONGEST, required: true });
-  input.addEventListener("input", () => alter(`name ${what} ${state.list[what].indexOf(one)}`, () => { for (const put of places) put(input.value); }));
+  on(input, "input", () => alter(`name ${what} ${state.list[what].indexOf(one)}`, () => { for (const put of places) put(input.value); }));
   return labelled("Name", input, `name of ${one.name}`);
 }
 

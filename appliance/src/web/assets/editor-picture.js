@@ -1,5 +1,5 @@
 // The picture of golden in the editor: its layers and zoom, and the features on it, which are drawn and moved with a mouse, a finger or keys.
-import { $, draw, fill, text } from "./element.js";
+import { $, draw, fill, on, text } from "./element.js";
 import { map } from "./api.js";
 import { paint } from "./colour.js";
 import { marks } from "./found.js";
@@ -30,7 +30,7 @@ export const pixel = () => view.mm;
 export async function showLayer(layer = view.layer) {
   const turn = view.asked += 1;
   view.layer = layer;
-  for (const one of document.querySelectorAll("[data-golden]")) one.setAttribute("aria-pressed", String(one.dataset.golden === layer));
+  for (const one of document.querySelectorAll("[data-golden]")) one.setAttribute("aria-pressed", one.dataset.golden === layer);
   const { number, camera } = state.recipe;
   for (const id of ["editor-regions", "editor-found"]) $(id).setAttribute("viewBox", `0 0 ${camera.width} ${camera.height}`);
   try {
@@ -285,20 +285,15 @@ function keys(event) {
 // `made` gets a feature that was drawn, `choose` the place of one that was touched; `tooled` is called when a tool is taken or left.
 export function start({ made, choose, tooled }) {
   Object.assign(view, { made, choose, tooled });
-  const on = (type, act) => svg().addEventListener(type, act);
-  on("pointerdown", press);
-  on("pointermove", follow);
-  on("pointerup", lift);
-  on("pointercancel", lift);
-  on("keydown", keys);
-  $("editor-plate").addEventListener("wheel", (event) => {
+  for (const [kind, act] of [["pointerdown", press], ["pointermove", follow], ["pointerup", lift], ["pointercancel", lift], ["keydown", keys]]) on(svg(), kind, act);
+  on($("editor-plate"), "wheel", (event) => {
     if (!event.ctrlKey) return;
     event.preventDefault();
     zoom(Math.min(6, Math.max(1, view.zoom * (event.deltaY < 0 ? 1.2 : 1 / 1.2))), [event.clientX, event.clientY]);
   }, { passive: false });
-  window.addEventListener("resize", () => { if (state.list && !$("editor").hidden) placeHandles(); });
-  $("zoom-in").addEventListener("click", () => nextZoom(1));
-  $("zoom-out").addEventListener("click", () => nextZoom(-1));
-  $("zoom").addEventListener("click", () => zoom(1));
-  for (const one of document.querySelectorAll("[data-golden]")) one.addEventListener("click", () => showLayer(one.dataset.golden));
+  on(window, "resize", () => { if (state.list && !$("editor").hidden) placeHandles(); });
+  on($("zoom-in"), "click", () => nextZoom(1));
+  on($("zoom-out"), "click", () => nextZoom(-1));
+  on($("zoom"), "click", () => zoom(1));
+  for (const one of document.querySelectorAll("[data-golden]")) on(one, "click", () => showLayer(one.dataset.golden));
 }

@@ -1,5 +1,5 @@
 // The lists of the editor: each feature, datum system and gauge is a row that opens as a form.
-import { $, button, fill, make, text } from "./element.js";
+import { $, button, fill, make, on, text } from "./element.js";
 import { choose } from "./question.js";
 import { addGauge, addSizes, featureKind, fitting, foundOf, hanging, remove, sizeKind, spoken, state, unmeasured } from "./editor-list.js";
 import { nameField, parameter } from "./editor-fields.js";
@@ -81,7 +81,7 @@ function row(what, one, at) {
   head.type = "button";
   head.id = `row-${what}-${at}`;
   head.setAttribute("aria-expanded", String(open));
-  head.addEventListener("click", () => { state.open = open ? "" : key; if (what === "features") state.chosen = [at]; hooks.opened(); });
+  on(head, "click", () => { state.open = open ? "" : key; if (what === "features") state.chosen = [at]; hooks.opened(); });
   const update = () => {
     const [said, tone] = words(one);
     name.textContent = one.name;
@@ -98,7 +98,7 @@ function row(what, one, at) {
     box.id = `choose-${at}`;
     box.checked = state.chosen.includes(at);
     box.setAttribute("aria-label", `${one.name} for a new gauge`);
-    box.addEventListener("change", () => { state.chosen = state.chosen.filter((other) => other !== at).concat(box.checked ? [at] : []); hooks.chosen(); });
+    on(box, "change", () => { state.chosen = state.chosen.filter((other) => other !== at).concat(box.checked ? [at] : []); hooks.chosen(); });
     line.append(make("label", "pick", box));
   }
   line.append(head);

@@ -1,5 +1,5 @@
 // A table of nominal values, as a spreadsheet copies it: each line becomes the limits of the gauge that it names.
-import { $, text } from "./element.js";
+import { $, on, text } from "./element.js";
 import { alter, gaugeKind, inUnits, state } from "./editor-list.js";
 import { unitOf } from "./api.js";
 
@@ -39,4 +39,4 @@ function take() {
   text("editor-taken", [`Gauges with new limits: ${sound.length}.`].concat(wrong.map((one) => `Left out: ${one.wrong}.`)).join(" "));
 }
 
-export function start() { $("editor-take").addEventListener("click", take); }
+export function start() { on($("editor-take"), "click", take); }

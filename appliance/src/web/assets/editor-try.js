@@ -1,13 +1,15 @@
 // Tries the list before it is stored: what it finds on golden after each change, what is wrong with it, and how it would judge the last parts.
-import { $, fill, make, show, text } from "./element.js";
+import { $, fill, heading, make, on, scrolling, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { quantity } from "./number.js";
 import { decided, tag } from "./verdict.js";
 import { state } from "./editor-list.js";
+import { isBarred, needed } from "./session.js";
 
 // A change is tried when nothing was changed for so long, ms. A try on parts has so many of them.
 const PAUSE = 300;
 const PARTS = 20;
+const TRY = "POST /api/recipes/{number}/try";
 let timer = 0, turn = 0, onParts = 0, hooks = null;
 
 // The list as a request has it.
@@ -26,7 +28,7 @@ function problem({ words, refused, at, feature, datum, gauge }) {
   if (!what || typeof at !== "number") return make("li", refused ? "bad" : "", mark, words);
   const go = make("button", "plain", words);
   go.type = "button";
-  go.addEventListener("click", () => hooks.go(what, at));
+  on(go, "click", () => hooks.go(what, at));
   return make("li", refused ? "bad" : "", mark, go);
 }
 
@@ -42,6 +44,7 @@ function take(answer) {
 export async function tryNow() {
   clearTimeout(timer);
   timer = 0;
+  if (isBarred(TRY)) { text("editor-state", `To try it ${needed(TRY)}.`); return true; }
   const mine = turn += 1, { number } = state.recipe;
   try {
     const answer = await send({});
@@ -71,8 +74,7 @@ export function forget() {
 }
 
 function partRow(part, names) {
-  const head = make("th", "", part.seq === null ? "last" : `no. ${part.seq}`);
-  head.scope = "row";
+  const head = heading("row", part.seq === null ? "last" : `no. ${part.seq}`);
   if (part.error) {
     const cell = make("td", "bad", part.error);
     cell.colSpan = names.length + 2;
@@ -87,16 +89,11 @@ function partRow(part, names) {
 
 function drawParts(parts) {
   if (!parts.length) { fill($("parts"), make("p", "quiet", "There is no last part, and no part's frames are kept.")); return; }
-  const column = (words) => { const made = make("th", "", words); made.scope = "col"; return made; };
   const names = state.list.gauges.map(({ name }) => name), judged = parts.filter(({ error }) => !error);
   const count = (key) => judged.filter((part) => part[key] === "PASS").length;
   const words = `${count("verdict")} of ${judged.length} parts would pass by this list; ${count("before")} passed when they were measured.`;
-  const table = make("table", "list", make("thead", "", make("tr", "", ...["Part", "By this list", "Before"].concat(names).map(column))), make("tbody", "", ...parts.map((part) => partRow(part, names))));
-  const scroll = make("div", "scroll", table);
-  scroll.tabIndex = 0;
-  scroll.setAttribute("role", "region");
-  scroll.setAttribute("aria-label", "values of the last parts by this list");
-  fill($("parts"), make("p", "", words), scroll);
+  const head = make("tr", "", ...["Part", "By this list", "Before"].concat(names).map((one) => heading("col", one)));
+  fill($("parts"), make("p", "", words), scrolling("values of the last parts by this list", make("thead", "", head), make("tbody", "", ...parts.map((part) => partRow(part, names)))));
 }
 
 // Tries the list on the kept parts of this recipe and the last part.

@@ -1,5 +1,5 @@
 // Edits a recipe: features that are drawn on the picture of golden, datum systems, gauges and their limits; tried while they are edited, then stored.
-import { $, button, fill, show, text } from "./element.js";
+import { $, button, fill, on, show, text } from "./element.js";
 import { ask, loadKinds } from "./api.js";
 import { change, notice } from "./session.js";
 import { choose } from "./question.js";
@@ -174,22 +174,22 @@ export function start() {
   state.changed = changed;
   startPicture({ made, choose: chosen, tooled: () => {
     const now = tool();
-    for (const one of $("editor-tools").children) one.setAttribute("aria-pressed", String(Boolean(now) && one.dataset.tool === now.kind.kind));
+    for (const one of $("editor-tools").children) one.setAttribute("aria-pressed", Boolean(now) && one.dataset.tool === now.kind.kind);
   } });
   startRows({ opened: () => { markChosen(); drawRows(); }, chosen: () => { markChosen(); markRows(); }, corner: corners, datum: openDatum });
   startDatum();
   startTable();
   startTry({ found: () => { showMarks(state.found.features); showFound(); }, go });
   for (const [id, key] of NAMES) {
-    $(id).addEventListener("input", () => { if ($(id).checkValidity()) alter(id, () => { state.list[key] = key === "guard_k" ? Number($(id).value) : $(id).value; }); });
+    on($(id), "input", () => { if ($(id).checkValidity()) alter(id, () => { state.list[key] = key === "guard_k" ? Number($(id).value) : $(id).value; }); });
   }
-  $("editor-undo").addEventListener("click", undo);
-  $("editor-redo").addEventListener("click", redo);
-  $("editor-parts").addEventListener("click", tryParts);
-  $("editor-sign").addEventListener("click", () => change(tryNow));
-  $("editor-close").addEventListener("click", async () => { if (await leave()) close(); });
-  $("editor-form").addEventListener("submit", save);
-  document.addEventListener("keydown", keys);
-  window.addEventListener("session", () => { if (state.list) trySoon(); });
-  window.addEventListener("beforeunload", (event) => { if (isChanged()) { event.preventDefault(); event.returnValue = UNSAVED; } });
+  on($("editor-undo"), "click", undo);
+  on($("editor-redo"), "click", redo);
+  on($("editor-parts"), "click", tryParts);
+  on($("editor-sign"), "click", () => change(tryNow));
+  on($("editor-close"), "click", async () => { if (await leave()) close(); });
+  on($("editor-form"), "submit", save);
+  on(document, "keydown", keys);
+  on(window, "session", () => { if (state.list) trySoon(); });
+  on(window, "beforeunload", (event) => { if (isChanged()) { event.preventDefault(); event.returnValue = UNSAVED; } });
 }

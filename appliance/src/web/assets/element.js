@@ -16,6 +16,29 @@ export function make(name, kind, ...children) {
   return made;
 }
 
+// An element with a name for those who hear the page.
+export function label(element, words) {
+  element.setAttribute("aria-label", words);
+  return element;
+}
+
+// A cell at the head of a "row" or a "col".
+export function heading(scope, ...children) {
+  const made = make("th", "", ...children);
+  made.scope = scope;
+  return made;
+}
+
+export const cells = (...all) => all.map((one) => make("td", "", one));
+
+// A table that scrolls where it is wider than the screen, also by keys.
+export function scrolling(name, ...children) {
+  const made = label(make("div", "scroll", make("table", "list", ...children)), name);
+  made.tabIndex = 0;
+  made.setAttribute("role", "region");
+  return made;
+}
+
 // An element of SVG with attributes.
 export function draw(name, attributes, ...children) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -30,13 +53,27 @@ export function fill(element, ...children) {
   element.append(...children);
 }
 
+// Does something on an event of an element. No form is sent.
+export function on(element, kind, act, options) {
+  element.addEventListener(kind, (event) => {
+    if (kind === "submit") event.preventDefault();
+    return act(event);
+  }, options);
+}
+
+// Disables an element for a reason of its own; one that the role may not use (`data-role`) stays disabled.
+export function disable(element, yes) {
+  element.held = yes;
+  element.disabled = yes || Boolean(element.dataset.role);
+}
+
 // A button that does something; it is disabled until that has ended.
 export function button(words, kind, act) {
   const made = make("button", kind, words);
   made.type = "button";
-  made.addEventListener("click", async () => {
-    made.disabled = true;
-    try { await act(); } finally { made.disabled = false; }
+  on(made, "click", async () => {
+    disable(made, true);
+    try { await act(); } finally { disable(made, false); }
   });
   return made;
 }

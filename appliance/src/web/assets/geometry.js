@@ -1,7 +1,7 @@
 // The poses of the board: takes, shows and forgets them, and says which are missing.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, disable, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change } from "./session.js";
+import { change, needs } from "./session.js";
 import { choose } from "./question.js";
 import { showPicture } from "./live.js";
 import { place } from "./simulation.js";
@@ -38,8 +38,8 @@ async function take() {
 
 async function showPose() {
   const pose = state.poses.find((one) => one.number === state.chosen);
-  for (const row of $("poses").children) row.querySelector(".open").setAttribute("aria-pressed", String(Number(row.dataset.pose) === state.chosen));
-  show("pose-shown", Boolean(pose));
+  for (const row of $("poses").children) row.querySelector(".open").setAttribute("aria-pressed", Number(row.dataset.pose) === state.chosen);
+  show("pose-shown", pose);
   const wanted = pose ? `${pose.number}/${pose.corners}/${pose.problem}/${state.poses.length}` : "";
   if (wanted === state.shown) return;
   state.shown = wanted;
@@ -62,9 +62,9 @@ function figures({ corners, of, tilt_degrees, camera_px, projector_px }) {
 function row(pose, busy) {
   const { number, usable, problem } = pose;
   const look = button(`Pose ${number}`, "open", () => { state.chosen = number; showPose(); });
-  const forget = button("Forget", "", () => send({ action: "forget", pose: number }));
-  forget.setAttribute("aria-label", `Forget pose ${number}`);
-  forget.disabled = busy;
+  const forget = label(button("Forget", "", () => send({ action: "forget", pose: number })), `Forget pose ${number}`);
+  needs(forget, "POST /api/head/steps/{name}");
+  disable(forget, busy);
   const words = make("div", "", make("span", usable ? "" : "bad", usable ? "✓ can be used" : `✗ cannot be used: ${problem}`), make("small", "", figures(pose)));
   const line = make("li", "", look, words, forget);
   line.dataset.pose = number;
@@ -92,7 +92,7 @@ function showBoard(board) {
 const SCALES = { unchecked: "not checked", length: "checked by the length", baseline: "as before" };
 
 function showResult(result) {
-  show("geometry-result", Boolean(result));
+  show("geometry-result", result);
   if (!result) return;
   text("result-camera", `${result.camera_px.toFixed(3)} px`);
   text("result-projector", `${result.projector_px.toFixed(3)} px`);
@@ -129,12 +129,12 @@ export function showGeometry(geometry, busy) {
 }
 
 export function start() {
-  $("board").addEventListener("input", () => {
+  on($("board"), "input", () => {
     state.edited = true;
     $("board-print").href = `api/head/board.pdf?board=${boardAsTyped()}`;
   });
-  $("board").addEventListener("submit", (event) => event.preventDefault());
-  $("pose-take").addEventListener("click", take);
+  on($("board"), "submit", () => {});
+  on($("pose-take"), "click", take);
   fill($("board-pose"), ...POSES.map((words, at) => new Option(`pose ${at + 1}`, at + 1)));
   const putters = [
     ["board-place", () => ({ part: "board", pose: Number($("board-pose").value) }), "the board is in place"],
@@ -143,6 +143,6 @@ export function start() {
     ["empty-place", () => ({ part: "empty" }), "the part is taken away"],
   ];
   for (const [id, wanted, words] of putters) {
-    $(id).addEventListener("click", () => place(wanted(), words));
+    on(needs($(id), "PUT /api/simulation/part"), "click", () => place(wanted(), words));
   }
 }

@@ -1,5 +1,5 @@
 // The head: its live picture, its set-up step by step, and its drift.
-import { $, fill, show, text } from "./element.js";
+import { $, fill, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { moment } from "./number.js";
 import { trend } from "./trend.js";
@@ -14,7 +14,7 @@ let visible = false;
 
 // Whether camera and projector are still where they were calibrated, by the last checks.
 function showDrift(drift) {
-  show("drift", Boolean(drift));
+  show("drift", drift);
   if (!drift) return;
   const when = drift.at_unix_s ? ` Checked ${moment({ utc_us: 1e6 * drift.at_unix_s })}.` : "";
   const off = `${drift.epipolar_px.toFixed(2)} px off their epipolar lines, limit ${drift.limit_px.toFixed(2)} px`;
@@ -63,15 +63,17 @@ export function openHead(open) {
 }
 
 // A first visit to a head that is not calibrated starts with its set-up.
-async function lead() {
-  const { open, calibrated } = await ask("GET", "api/head");
-  if (open && !calibrated && !location.hash) location.replace("#head");
+export async function lead() {
+  if (location.hash) return;
+  try {
+    const { open, calibrated } = await ask("GET", "api/head");
+    if (open && !calibrated && !location.hash) location.replace("#head");
+  } catch (gone) { /* The live view says so. */ }
 }
 
 export function start() {
   startLive();
   startSteps();
   startGeometry();
-  window.addEventListener("head", refresh);
-  if (!location.hash) lead().catch(() => {});
+  on(window, "head", refresh);
 }

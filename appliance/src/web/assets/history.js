@@ -1,5 +1,5 @@
 // Stored results, filtered, a page at a time.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, cells, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { openKept } from "./kept.js";
 import { about, count, milliseconds, moment } from "./number.js";
@@ -12,10 +12,17 @@ let seen = false;
 // What a chart has chosen, in place of dates.
 let chosen = null;
 
-// The beginning of the chosen day in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
-function day(id, more) {
-  const [year, month, date] = $(id).value.split("-").map(Number);
+// The beginning of the day of a field in the browser's time zone, or of the day `more` days later, µs since 1970 UTC.
+function day(value, more) {
+  const [year, month, date] = value.split("-").map(Number);
   return 1000 * Math.max(0, new Date(year, month - 1, date + more).getTime());
+}
+
+// Adds the days of a filter to a query.
+export function setDays(wanted, id) {
+  const [from, to] = [$(`${id}-from`).value, $(`${id}-to`).value];
+  if (from) wanted.set("since_us", day(from, 0));
+  if (to) wanted.set("until_us", day(to, 1));
 }
 
 function filter() {
@@ -27,8 +34,7 @@ function filter() {
     for (const key of Object.keys(chosen.keys)) wanted.set(key, chosen.keys[key]);
     return wanted;
   }
-  if ($("filter-from").value) wanted.set("since_us", day("filter-from", 0));
-  if ($("filter-to").value) wanted.set("until_us", day("filter-to", 1));
+  setDays(wanted, "filter");
   return wanted;
 }
 
@@ -44,16 +50,13 @@ function row(entry) {
     const link = make("a", "", "ZIP");
     link.href = `api/history/${entry.seq}/recording.zip`;
     link.setAttribute("download", "");
-    link.setAttribute("aria-label", `ZIP: frames of no. ${entry.seq}`);
-    frames.append(link);
+    frames.append(label(link, `ZIP: frames of no. ${entry.seq}`));
   }
   const verdict = make("span", `tag ${entry.verdict.toLowerCase()}`, entry.verdict);
-  const open = button(String(entry.seq), "open", () => openKept(entry.seq, boot));
-  open.setAttribute("aria-label", `show no. ${entry.seq}`);
+  const open = label(button(String(entry.seq), "open", () => openKept(entry.seq, boot)), `show no. ${entry.seq}`);
   const when = make("td", "nowrap", moment(entry, boot));
   when.title = about(entry);
-  return make("tr", "", make("td", "", open), when, make("td", "", `${entry.recipe}`), make("td", "", String(entry.part_id)),
-    make("td", "", verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
+  return make("tr", "", ...cells(open), when, ...cells(`${entry.recipe}`, String(entry.part_id), verdict), make("td", "nowrap", milliseconds(entry.total_us)), make("td", "", outside(entry)), frames);
 }
 
 async function load(more) {
@@ -92,7 +95,7 @@ export function listRange(recipe, keys, words) {
 }
 
 function range() {
-  show("filter-range", Boolean(chosen));
+  show("filter-range", chosen);
   text("filter-range-words", chosen ? `from the chart: ${chosen.words}` : "");
 }
 
@@ -105,8 +108,8 @@ export function openHistory(visible, now) {
 }
 
 export function start() {
-  $("filter").addEventListener("submit", (event) => { event.preventDefault(); load(false); });
-  $("filter-range-drop").addEventListener("click", () => { chosen = null; range(); load(false); });
-  $("history-more").addEventListener("click", () => load(true));
-  window.addEventListener("dated", () => { if (seen) load(false); });
+  on($("filter"), "submit", () => load(false));
+  on($("filter-range-drop"), "click", () => { chosen = null; range(); load(false); });
+  on($("history-more"), "click", () => load(true));
+  on(window, "dated", () => { if (seen) load(false); });
 }

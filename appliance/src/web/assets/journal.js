@@ -1,17 +1,12 @@
-// Health, event log and the record of changes.
+// Health and event log.
 import { $, fill, make } from "./element.js";
 import { ask } from "./api.js";
+import { followChanges, line, openChanges } from "./changes.js";
 import { about, count, duration, milliseconds, moment } from "./number.js";
 import { notice } from "./session.js";
 
 let timer = 0;
 let boot = "";
-
-function line(when, words, kind, title) {
-  const moment = make("span", "when", when);
-  if (title) moment.title = title;
-  return make("li", kind || "", moment, make("span", "", words));
-}
 
 function known(value, unit, places = 0) {
   return value === null || value === undefined ? "not known" : count(value.toFixed(places)) + unit;
@@ -77,12 +72,9 @@ function condition(now) {
 
 async function refresh() {
   try {
-    const [log, changes] = await Promise.all([ask("GET", "api/log"), ask("GET", "api/changes")]);
+    const [log] = await Promise.all([ask("GET", "api/log"), followChanges()]);
     fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words, "", about(entry))));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
-    fill($("change-lines"), ...changes.changes.map((entry) =>
-      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}${entry.changed ? `: ${entry.changed}` : ""}`, entry.outcome === "done" ? "" : "refused", about(entry))));
-    if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
   } catch (error) { notice(error.message, true); }
 }
 
@@ -94,6 +86,7 @@ export function openDevice(visible, now) {
   clearInterval(timer);
   boot = now.boot_id;
   if (!visible) return;
+  openChanges(now);
   refresh();
   timer = setInterval(refresh, 2000);
 }

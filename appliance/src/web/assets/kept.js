@@ -1,5 +1,5 @@
 // One stored result: its values, and the pictures of its part if the frames were kept.
-import { $, fill, make, show, text } from "./element.js";
+import { $, fill, make, on, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
 import { marks } from "./found.js";
@@ -122,10 +122,10 @@ export function kept() { return state.result; }
 
 export function start() {
   view = viewOf($("kept-map"));
-  $("kept-close").addEventListener("click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
+  on($("kept-close"), "click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
   for (const choice of document.querySelectorAll("[data-kept]")) {
-    choice.addEventListener("click", () => {
-      for (const other of document.querySelectorAll("[data-kept]")) other.setAttribute("aria-pressed", String(other === choice));
+    on(choice, "click", () => {
+      for (const other of document.querySelectorAll("[data-kept]")) other.setAttribute("aria-pressed", other === choice);
       state.layer = choice.dataset.kept;
       picture();
     });

@@ -1,9 +1,10 @@
 // The live picture of the head: each is asked for when the one before is shown, so nothing is exposed unless somebody looks.
-import { $, draw, fill, make, show, text } from "./element.js";
+import { $, disable, draw, fill, make, on, show, text } from "./element.js";
 import { ask, picture } from "./api.js";
 import { signed } from "./number.js";
-import { change, isSignedIn, notice, open, refresh } from "./session.js";
+import { change, isSignedIn, may, needed, notice, open } from "./session.js";
 
+const PICTURE = "GET /api/head/live";
 // Until it is asked again, while the head is busy with something else, ms.
 const RETRY_MS = 400;
 // Largest share of saturated pixels and least brightness under white, as shares of full scale: the doctor's limits.
@@ -19,7 +20,7 @@ const RECENT = 8;
 
 const state = { visible: false, busy: "", turn: 0, shown: [], edited: false, refresh_us: 0, best: {}, edge: null };
 const pause = (ms) => new Promise((done) => { setTimeout(done, ms); });
-const isWanted = () => state.visible && !state.busy && !document.hidden && isSignedIn();
+const isWanted = () => state.visible && !state.busy && !document.hidden && may(PICTURE);
 const percent = (share, places) => `${(100 * share).toFixed(places)} %`;
 
 function drawHistogram({ histogram, saturated, brightest }) {
@@ -80,7 +81,7 @@ export function showCamera({ refresh_us, exposure_us, gain, least_gain, adjustab
     const once = offered.filter((us, at) => offered.findIndex((other) => Math.abs(other - us) < refresh_us / 8) === at).sort((a, b) => a - b);
     fill($("live-exposure"), ...once.map((us) => new Option(`${(us / 1000).toFixed(1)} ms`, us)));
   }
-  for (const field of $("live-form").querySelectorAll(".exposing")) field.disabled = !adjustable;
+  for (const field of $("live-form").querySelectorAll(".exposing")) disable(field, !adjustable);
   if (state.edited) return;
   const options = Array.from($("live-exposure").options);
   const chosen = options.find((option) => Math.abs(option.value - exposure_us) < refresh_us / 8);
@@ -138,19 +139,21 @@ function stop(words) {
   state.shown = [];
   text("live-rate", "");
   text("live-words", words);
-  show("live-words", Boolean(words));
+  show("live-words", words);
 }
 
 async function follow() {
   const turn = state.turn += 1;
-  show("live-locked", !isSignedIn());
-  show("live-open", isSignedIn());
+  show("live-locked", !may(PICTURE));
+  show("live-open", may(PICTURE));
+  show("live-sign", !isSignedIn());
+  text("live-needs", `The live picture ${needed(PICTURE)}.`);
   stop(state.busy);
   while (turn === state.turn && isWanted()) {
     try { await next(turn); } catch (error) {
       if (turn !== state.turn) return;
       stop(error.message);
-      if (error.status === 401) { refresh(); return; }
+      if (error.status === 401 || error.role) return;
       await pause(RETRY_MS);
     }
   }
@@ -182,11 +185,11 @@ export function openLive(visible, busy = "") {
 }
 
 export function start() {
-  document.addEventListener("visibilitychange", follow);
-  window.addEventListener("session", follow);
-  $("live-sign").addEventListener("click", () => open(null));
-  for (const field of $("live-form").querySelectorAll(".exposing")) field.addEventListener("input", () => { state.edited = true; });
-  $("live-form").addEventListener("submit", (event) => { event.preventDefault(); expose(false); });
-  $("live-outline").addEventListener("change", () => { $("live-volume").toggleAttribute("hidden", !$("live-outline").checked); });
-  $("live-keep").addEventListener("click", () => expose(true));
+  on(document, "visibilitychange", follow);
+  on(window, "session", follow);
+  on($("live-sign"), "click", () => open(null));
+  for (const field of $("live-form").querySelectorAll(".exposing")) on(field, "input", () => { state.edited = true; });
+  on($("live-form"), "submit", () => expose(false));
+  on($("live-outline"), "change", () => { $("live-volume").toggleAttribute("hidden", !$("live-outline").checked); });
+  on($("live-keep"), "click", () => expose(true));
 }

@@ -1,6 +1,6 @@
 // The page: follows the snapshots, and shows each in the view that is open.
-import { $, show, text } from "./element.js";
-import { follow } from "./stale.js";
+import { $, disable, on, show, text } from "./element.js";
+import { follow, leave } from "./stale.js";
 import { isHeld, isOfOtherRecipe, showVerdict } from "./verdict.js";
 import { showGauges } from "./gauges.js";
 import { showTimes } from "./times.js";
@@ -9,15 +9,18 @@ import { list, showRecipes, start as startRecipes } from "./recipes.js";
 import { start as startEditor } from "./editor.js";
 import { showRegisters, start as startRegisters } from "./registers.js";
 import { openDevice, showDevice } from "./journal.js";
+import { start as startChanges } from "./changes.js";
+import { openUsers, start as startUsers } from "./users.js";
+import { openBackup, start as startBackup } from "./backup.js";
 import { openHistory, start as startHistory } from "./history.js";
 import { openStatistics, start as startStatistics } from "./statistics.js";
 import { start as startReport } from "./report.js";
 import { openStudies, start as startStudies } from "./studies.js";
-import { openHead, start as startHead } from "./head.js";
+import { lead, openHead, start as startHead } from "./head.js";
 import { start as startKept } from "./kept.js";
 import { start as startQuestion } from "./question.js";
 import { showSimulation, start as startSimulation } from "./simulation.js";
-import { change, start as startSession } from "./session.js";
+import { change, isLocked, open as signIn, refresh, start as startSession } from "./session.js";
 import { ask } from "./api.js";
 import { changes, count, duration, measures } from "./number.js";
 
@@ -32,6 +35,7 @@ const WAITING = { 3: "no recipe is active", 6: "another recipe is asked for" };
 let view = "live";
 let last = null;
 let shown = null;
+let locked = null;
 
 function showCounters(now) {
   for (const name of ["triggers", "missed", "sequence", "buffered"]) text(name, count(now.counters[name]));
@@ -57,8 +61,8 @@ function showSnapshot(now) {
   text("state-words", waiting ? why || "not ready" : loading || words);
   show("refusal", waiting);
   text("refusal", waiting ? `No trigger is accepted: ${now.refusal.words}.` : "");
-  $("trigger").disabled = !now.ready;
-  show("fault", Boolean(now.fault));
+  disable($("trigger"), !now.ready);
+  show("fault", now.fault);
   if (now.fault) {
     text("fault-code", `${now.fault.code} · ${now.fault.family}`);
     text("fault-cause", now.fault.cause);
@@ -70,8 +74,11 @@ function showSnapshot(now) {
   showDevice(now, view === "device");
   showSimulation(now);
   // Times that were recorded without a synchronised clock are relative to the start of the program, so the lists are read again when
-  // BOOT_ID is known or has changed.
-  if (restarted) { openHistory(view === "history", now); openStatistics(view === "history", now); openStudies(view === "history", now); openDevice(view === "device", now); }
+  // BOOT_ID is known or has changed. The session may have ended with the program.
+  if (restarted) {
+    refresh();
+    openLists(now);
+  }
   const key = `${now.boot_id}/${now.result ? now.result.seq : "none"}`;
   if (key !== shown) {
     shown = key;
@@ -85,10 +92,15 @@ function showSnapshot(now) {
   document.title = `${live ? now.result.verdict : words} · fringed`;
 }
 
+function openLists(now) {
+  for (const open of [openHistory, openStatistics, openStudies]) open(view === "history", now);
+  for (const open of [openDevice, openUsers, openBackup]) open(view === "device", now);
+}
+
 function openView() {
   const wanted = location.hash.slice(1);
-  if (wanted && !VIEWS.includes(wanted)) return;
-  view = wanted || "live";
+  if (!locked && wanted && !VIEWS.includes(wanted)) return;
+  view = locked ? "" : wanted || "live";
   document.body.dataset.view = view;
   for (const name of VIEWS) show(`view-${name}`, name === view);
   for (const link of document.querySelectorAll("nav a")) {
@@ -98,16 +110,27 @@ function openView() {
   showRegisters(view === "registers");
   openHead(view === "head");
   if (last) {
-    openHistory(view === "history", last);
-    openStatistics(view === "history", last);
-    openStudies(view === "history", last);
-    openDevice(view === "device", last);
+    openLists(last);
     showPicture(last.result, view === "live");
     showDevice(last, view === "device");
   }
 }
 
-startSession();
+// Shows the page, or only the form to sign in while nothing may be looked at without. Then nothing is asked of the device.
+function admit() {
+  if (isLocked() === locked) return;
+  locked = isLocked();
+  document.body.classList.toggle("locked", locked);
+  openView();
+  if (locked) {
+    leave();
+    signIn(null);
+  } else {
+    follow(showSnapshot);
+    lead();
+  }
+}
+
 startQuestion();
 startPicture();
 startRecipes();
@@ -120,9 +143,14 @@ startStatistics();
 startReport(() => last);
 startStudies();
 startHead();
-$("trigger").addEventListener("click", () => change(() => ask("POST", "api/trigger")));
-$("reset").addEventListener("click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
-window.addEventListener("hashchange", openView);
-window.addEventListener("recipes", list);
-openView();
-follow(showSnapshot);
+startChanges();
+startUsers();
+startBackup();
+on($("trigger"), "click", () => change(() => ask("POST", "api/trigger")));
+on($("reset"), "click", () => change(() => ask("POST", "api/reset"), "errors are reset"));
+on(window, "hashchange", openView);
+on(window, "recipes", list);
+startSession().then(() => {
+  on(window, "session", admit);
+  admit();
+});

@@ -96,5 +96,8 @@ assets! {
         "steps.js"
         "geometry.js"
         "registers.js"
+        "changes.js"
+        "users.js"
+        "backup.js"
         "journal.js";
 }

@@ -1,5 +1,5 @@
 // What teaching took for the part: shown in colour, corrected by touches or by an outline, and taught again.
-import { $, draw, fill, show, text } from "./element.js";
+import { $, draw, fill, on, show, text } from "./element.js";
 import { words } from "./api.js";
 import { change, notice } from "./session.js";
 
@@ -44,7 +44,7 @@ function mark() {
   if (view.place) made.push(draw("circle", { class: "refused", "vector-effect": "non-scaling-stroke", cx: view.place[0] + 0.5, cy: view.place[1] + 0.5, r: 1.8 * r }));
   if (view.at) made.push(draw("path", { class: "keys", "vector-effect": "non-scaling-stroke", d: `M${view.at[0] - r} ${view.at[1]}h${2 * r}M${view.at[0]} ${view.at[1] - r}v${2 * r}` }));
   fill(svg(), ...made);
-  $("part-outline").setAttribute("aria-pressed", String(view.outlining));
+  $("part-outline").setAttribute("aria-pressed", view.outlining);
   const said = outline.length + part.length + others.length > 0;
   $("part-forget").disabled = !said;
   text("part-cursor", view.outlining ? `Outline: touch its corners in order, with everything of the part inside${outline.length > 2 ? "; the first one ends it" : ""}. Arrow keys move the cross, Enter touches, Escape ends.`
@@ -99,18 +99,18 @@ export async function showPart(number) {
 
 // `teach` teaches a number again with what is marked.
 export function start({ teach }) {
-  svg().addEventListener("click", (event) => {
+  on(svg(), "click", (event) => {
     const box = svg().getBoundingClientRect();
     touch(inFrame([(event.clientX - box.left) / box.width * view.size[0] - 0.5, (event.clientY - box.top) / box.height * view.size[1] - 0.5]));
   });
-  svg().addEventListener("keydown", keys);
-  $("part-outline").addEventListener("click", () => {
+  on(svg(), "keydown", keys);
+  on($("part-outline"), "click", () => {
     if (view.outlining) endOutline();
     else { view.outlining = true; view.marking.outline = []; svg().focus({ preventScroll: true }); }
     mark();
   });
-  $("part-forget").addEventListener("click", () => { view.marking = nothing(); view.outlining = false; mark(); });
-  $("part-teach").addEventListener("click", () => {
+  on($("part-forget"), "click", () => { view.marking = nothing(); view.outlining = false; mark(); });
+  on($("part-teach"), "click", () => {
     endOutline();
     change(() => teach(view.number, view.marking)).catch((error) => notice(error.message, true));
   });

@@ -1,5 +1,5 @@
 // The maps of the last part, with scale, cursor and the outlines of the recipe's regions.
-import { $, draw, fill, show, text } from "./element.js";
+import { $, draw, fill, on, show, text } from "./element.js";
 import { ask, cornersOf, kindOf, loadKinds, map } from "./api.js";
 import { paint } from "./colour.js";
 import { marks } from "./found.js";
@@ -186,8 +186,8 @@ export function showPicture(result, visible) {
 
 export function start() {
   for (const choice of document.querySelectorAll("[data-layer]")) {
-    choice.addEventListener("click", () => {
-      for (const other of document.querySelectorAll("[data-layer]")) other.setAttribute("aria-pressed", String(other === choice));
+    on(choice, "click", () => {
+      for (const other of document.querySelectorAll("[data-layer]")) other.setAttribute("aria-pressed", other === choice);
       state.layer = choice.dataset.layer;
       showPicture(state.result, true);
     });

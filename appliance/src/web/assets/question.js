@@ -1,5 +1,5 @@
 // A question before something is replaced or deleted. It keeps the keyboard focus until it is answered; Escape is Cancel.
-import { $, button, fill, show, text } from "./element.js";
+import { $, button, fill, on, show, text } from "./element.js";
 
 let answer = null;
 
@@ -50,6 +50,6 @@ export async function enter(title, words, label, value, action) {
 }
 
 export function start() {
-  $("question-text").addEventListener("keydown", (event) => { if (event.key === "Enter") $("question-choices").firstChild.click(); });
-  $("question").addEventListener("keydown", keys);
+  on($("question-text"), "keydown", (event) => { if (event.key === "Enter") $("question-choices").firstChild.click(); });
+  on($("question"), "keydown", keys);
 }

@@ -1,7 +1,7 @@
 // The recipes: list, load, teach and compare, export, import, delete and undo.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, cells, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change, notice } from "./session.js";
+import { change, needs, notice } from "./session.js";
 import { choose } from "./question.js";
 import { edit } from "./editor.js";
 import { showPart, start as startPart } from "./part.js";
@@ -20,28 +20,24 @@ function day(unix_s) {
 }
 
 function row(recipe) {
+  const { number } = recipe;
   if (recipe.error) {
     const words = make("td", "", recipe.error);
     words.colSpan = 6;
-    return make("tr", "", make("td", "", String(recipe.number)), words, make("td", "actions", remover(recipe)));
+    return make("tr", "", ...cells(String(number)), words, make("td", "actions", remover(recipe)));
   }
-  const use = button("Load", "", () => change(() => ask("POST", `api/recipes/${recipe.number}/load`), `recipe ${recipe.number} is being loaded`));
-  use.setAttribute("aria-label", `Load recipe ${recipe.number}`);
-  const alter = button("Edit", "", () => edit(recipe.number));
-  alter.setAttribute("aria-label", `Edit recipe ${recipe.number}`);
-  const gain = button("Before / after", "", () => compare(recipe.number));
-  gain.setAttribute("aria-label", `Before / after: what teaching recipe ${recipe.number} gained`);
-  const take = make("a", "", "Export");
-  take.href = `api/recipes/${recipe.number}/file`;
+  const act = (words, does) => label(button(words, "", does), `${words} recipe ${number}`);
+  const use = act("Load", () => change(() => ask("POST", `api/recipes/${number}/load`), `recipe ${number} is being loaded`));
+  const gain = label(button("Before / after", "", () => compare(number)), `Before / after: what teaching recipe ${number} gained`);
+  const take = label(make("a", "", "Export"), `Export recipe ${number}`);
+  take.href = `api/recipes/${number}/file`;
   take.setAttribute("download", "");
-  take.setAttribute("aria-label", `Export recipe ${recipe.number}`);
-  const twin = button("Copy", "", () => change(() => copy(recipe.number)));
-  twin.setAttribute("aria-label", `Copy recipe ${recipe.number}`);
-  const own = recipe.number === active;
-  const line = make("tr", own ? "active" : "", make("td", "", String(recipe.number)), make("td", "", recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : "")),
-    make("td", "", recipe.part_number), make("td", "", make("code", "", recipe.fingerprint.slice(0, 8))), make("td", "", String(recipe.frames)),
-    make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, twin, take, remover(recipe)));
-  return line;
+  const twin = act("Copy", () => change(() => copy(number)));
+  const own = number === active, taught = make("td", "", day(recipe.taught_at_unix_s));
+  if (recipe.made_by) taught.append(make("small", "", `by ${recipe.made_by}`));
+  return make("tr", own ? "active" : "", ...cells(String(number), recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : ""), recipe.part_number,
+    make("code", "", recipe.fingerprint.slice(0, 8)), String(recipe.frames), String(recipe.gauges)), taught,
+  make("td", "actions", needs(use, "POST /api/recipes/{number}/load"), act("Edit", () => edit(number)), gain, needs(twin, "POST /api/recipes"), take, remover(recipe)));
 }
 
 // Stores a recipe once more under the first number that is free, for a variant of the part.
@@ -73,8 +69,7 @@ function remover(recipe) {
       list();
     });
   });
-  remove.setAttribute("aria-label", `Delete recipe ${recipe.number}`);
-  return remove;
+  return needs(label(remove, `Delete recipe ${recipe.number}`), "DELETE /api/recipes/{number}");
 }
 
 // A line below a recipe, or in place of a deleted one, that restores the previous version.
@@ -87,15 +82,15 @@ function undoer(number, before, words) {
     else notice(`recipe ${number} · ${now.name} is back${now.loading ? " and is being loaded" : ""}: its ${crc}`);
     list();
   }));
-  const place = make("td", "", undo);
+  const place = make("td", "", needs(undo, "POST /api/recipes/{number}/undo"));
   place.colSpan = 7;
   return make("tr", "before", make("td", "", before.deleted ? String(number) : ""), place);
 }
 
-// "the version of 2026-11-21 (a1b2c3d4, 4 gauges)"
+// "the version of 2026-11-21 (a1b2c3d4, 4 gauges) by anna (technician)"
 function version(recipe) {
   const when = recipe.taught_at_unix_s ? ` of ${day(recipe.taught_at_unix_s)}` : "";
-  return `the version${when} (${recipe.fingerprint.slice(0, 8)}, ${recipe.gauges} gauges)`;
+  return `the version${when} (${recipe.fingerprint.slice(0, 8)}, ${recipe.gauges} gauges)${recipe.made_by ? ` by ${recipe.made_by}` : ""}`;
 }
 
 function rows(recipe) {
@@ -214,7 +209,7 @@ export async function compare(number) {
     text("comparison-words", "this recipe was made from a recording: there is nothing to compare it with");
     return;
   }
-  const line = (name, of) => make("tr", "", make("td", "", name), make("td", "", `${(1000 * of.sigma_mm).toFixed(1)} µm`), make("td", "", `${(100 * of.coverage).toFixed(2)} % of the frame`));
+  const line = (name, of) => make("tr", "", ...cells(name, `${(1000 * of.sigma_mm).toFixed(1)} µm`, `${(100 * of.coverage).toFixed(2)} % of the frame`));
   fill($("comparison-rows"), line(`fixed: straight fringes, ${comparison.fixed.frames} frames`, comparison.fixed), line(`adaptive: the part's own, ${comparison.adaptive.frames} frames`, comparison.adaptive));
   const less = 100 * (1 - comparison.adaptive.sigma_mm / comparison.fixed.sigma_mm);
   const production = recipe.sequences[recipe.production];
@@ -227,7 +222,7 @@ export function showRecipes(now, visible) {
   const number = now.recipe ? now.recipe.number : null;
   const changed = number !== active || `${number}/${now.recipe ? now.recipe.fingerprint : ""}` !== listedFor;
   active = number;
-  show("teaching", Boolean(now.teach));
+  show("teaching", now.teach);
   if (now.teach) {
     text("teach-number", String(now.teach.number));
     $("teach-bar").value = now.teach.fraction;
@@ -250,13 +245,9 @@ export function showRecipes(now, visible) {
 
 export function start() {
   startPart({ teach: teachMarked });
-  $("teach-as").addEventListener("input", follow);
-  $("teach").addEventListener("submit", (event) => {
-    event.preventDefault();
-    change(() => teach(Number($("teach-as").value)));
-  });
-  $("import").addEventListener("submit", (event) => {
-    event.preventDefault();
+  on($("teach-as"), "input", follow);
+  on($("teach"), "submit", () => change(() => teach(Number($("teach-as").value))));
+  on($("import"), "submit", () => {
     const file = $("import-file").files[0];
     change(async () => {
       const imported = await take(file);

@@ -1,5 +1,5 @@
 // The registers as the PLC reads them, refreshed once a second while the view is open.
-import { $, fill, make } from "./element.js";
+import { $, cells, fill, make, on } from "./element.js";
 import { ask } from "./api.js";
 import { notice } from "./session.js";
 
@@ -31,7 +31,7 @@ function build(registers, wanted) {
     }
     const value = make("td", "value");
     rows.set(register.address, value);
-    lines.push(make("tr", register.served ? "" : "quiet", make("td", "", String(register.address)), make("td", "", make("code", "", register.name)), make("td", "", register.type), value, make("td", "quiet", register.meaning)));
+    lines.push(make("tr", register.served ? "" : "quiet", ...cells(String(register.address), make("code", "", register.name), register.type), value, make("td", "quiet", register.meaning)));
   }
   fill($("register-rows"), ...lines);
 }
@@ -55,5 +55,5 @@ export function showRegisters(visible) {
 }
 
 export function start() {
-  $("register-filter").addEventListener("input", () => refresh(true));
+  on($("register-filter"), "input", () => refresh(true));
 }

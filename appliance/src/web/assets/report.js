@@ -1,6 +1,6 @@
 // Reports for print and PDF by the browser: one part, a period, a study. Each page names the device, the recipe, the calibration, the
 // program, who printed it and when, and its number; browsers without margin boxes say it on the first page only.
-import { $, fill, make } from "./element.js";
+import { $, fill, make, on } from "./element.js";
 import { ask } from "./api.js";
 import { kept } from "./kept.js";
 import { date } from "./number.js";
@@ -67,6 +67,6 @@ function done() {
 
 export function start(snapshot) {
   latest = snapshot;
-  for (const one of document.querySelectorAll("[data-report]")) one.addEventListener("click", () => print(one.dataset.report));
-  window.addEventListener("afterprint", done);
+  for (const one of document.querySelectorAll("[data-report]")) on(one, "click", () => print(one.dataset.report));
+  on(window, "afterprint", done);
 }

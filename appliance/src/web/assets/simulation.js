@@ -1,5 +1,5 @@
 // The part in front of a simulated head: shows it, and replaces it.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, disable, fill, label, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 
@@ -26,15 +26,14 @@ function field(name, value, take) {
   input.step = name === "index" ? "1" : "any";
   input.required = true;
   input.value = String(value);
-  input.addEventListener("input", () => take(Number(input.value)));
+  on(input, "input", () => take(Number(input.value)));
   return make("label", "", words(name) + (UNITS[name] ? ` (${UNITS[name]})` : ""), input);
 }
 
 function showDefects() {
   const rows = (part.defects || []).map((defect, at) => {
     const numbers = Object.keys(defect).filter((name) => name !== "kind");
-    const remove = button("Remove", "", () => { part.defects.splice(at, 1); showDefects(); });
-    remove.setAttribute("aria-label", `Remove the defect ${words(defect.kind)}`);
+    const remove = label(button("Remove", "", () => { part.defects.splice(at, 1); showDefects(); }), `Remove the defect ${words(defect.kind)}`);
     return make("p", "line", make("b", "", words(defect.kind)), ...numbers.map((name) => field(name, defect[name], (number) => { defect[name] = number; })), remove);
   });
   fill($("part-defects"), ...rows);
@@ -52,7 +51,7 @@ function showPlacement({ shift_mm, tilt_deg, rotation_deg }) {
 function showFloor() {
   const [x, y] = floor ? floor.tilt_deg : [0, 0], there = floor || floors;
   $("floor").checked = Boolean(floor);
-  show("floor-fields", Boolean(floor));
+  show("floor-fields", floor);
   for (const [id, value] of [["albedo", there.albedo], ["depth", there.depth_mm], ["tilt-0", x], ["tilt-1", y], ["print", there.print_mm]]) $(`floor-${id}`).value = String(value);
   for (const name of STANDING) $(`floor-${name}`).checked = Boolean(floor && floor[name] && (name === "next_mm" || floor[name].length));
 }
@@ -138,24 +137,23 @@ export async function showSimulation(now) {
 }
 
 export function start() {
-  $("part-kind").addEventListener("change", () => {
+  on($("part-kind"), "change", () => {
     part = copy(kinds.find((one) => one.part.kind === $("part-kind").value).part);
     showDefects();
   });
-  $("unsteady").addEventListener("change", () => show("unsteady-fields", $("unsteady").checked));
-  $("floor").addEventListener("change", () => show("floor-fields", $("floor").checked));
-  $("pose").addEventListener("change", () => {
+  on($("unsteady"), "change", () => show("unsteady-fields", $("unsteady").checked));
+  on($("floor"), "change", () => show("floor-fields", $("floor").checked));
+  on($("pose"), "change", () => {
     const { poses } = kinds.find((one) => one.part.kind === part.kind);
     if ($("pose").value !== "") showPlacement(poses[Number($("pose").value)]);
   });
-  $("defect-add").addEventListener("click", () => {
+  on($("defect-add"), "click", () => {
     const offered = kinds.find((one) => one.part.kind === part.kind).defects;
     part.defects.push(copy(offered.find((defect) => defect.kind === $("defect-kind").value)));
     showDefects();
   });
-  $("simulation").addEventListener("submit", async (event) => {
-    event.preventDefault();
-    $("part-put").disabled = true;
-    try { await put(); } finally { $("part-put").disabled = false; }
+  on($("simulation"), "submit", async () => {
+    disable($("part-put"), true);
+    try { await put(); } finally { disable($("part-put"), false); }
   });
 }

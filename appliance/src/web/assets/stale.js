@@ -8,6 +8,8 @@ const STALE_MS = 2400;
 // A longer pause between two checks means that the page itself slept, as on a closed tablet.
 const SLEPT_MS = 1600;
 
+// Takes each snapshot; and the timer of the checks while events are followed.
+let shown = () => {}, checking = 0;
 const state = { source: null, event: -Infinity, beat: null, beatAt: -Infinity, checked: 0, boot: null, phase: false };
 // Time that also passes while the device sleeps: whichever of the two clocks advanced more counts.
 let offset = 0, lastMono = performance.now(), lastWall = Date.now();
@@ -30,6 +32,7 @@ function cover(stale, words) {
 }
 
 function check() {
+  if (!checking) return;
   const at = now();
   if (at - state.checked > SLEPT_MS && state.checked > 0) state.event = -Infinity;
   state.checked = at;
@@ -40,7 +43,10 @@ function check() {
   else if (still) cover(true, `the measuring task's heartbeat stands still${seconds(state.beatAt)}`);
   else cover(false, "");
   // The browser reconnects by itself unless the server refused it.
-  if (state.source.readyState === EventSource.CLOSED) open();
+  if (state.source.readyState === EventSource.CLOSED) {
+    window.dispatchEvent(new Event("refused"));
+    open();
+  }
 }
 
 // Restarts the animation of the cover.
@@ -49,7 +55,6 @@ function push() {
   $("stale").className = state.phase ? "one" : "two";
 }
 
-let shown = () => {};
 function open() {
   state.source = new EventSource("events");
   state.source.addEventListener("snapshot", (event) => {
@@ -70,6 +75,14 @@ function open() {
 export function follow(show) {
   shown = show;
   open();
-  setInterval(check, 400);
+  checking = setInterval(check, 400);
   document.addEventListener("visibilitychange", check);
+}
+
+// Follows no events until `follow` is called again.
+export function leave() {
+  clearInterval(checking);
+  checking = 0;
+  if (state.source) state.source.close();
+  document.title = "fringed";
 }

@@ -1,5 +1,5 @@
 // Statistics of a recipe over a period: results and yield, the figures of each gauge, and the run chart of one.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, fill, heading, label, make, on, show, text } from "./element.js";
 import { lines } from "./api.js";
 import { histogram, place, runChart, yieldChart } from "./chart.js";
 import { listRange, showResult } from "./history.js";
@@ -36,8 +36,7 @@ function wanted() {
 
 function opened(mark, more = "") {
   const made = button(`no. ${mark.seq}`, "open", () => showResult(mark.seq));
-  made.setAttribute("aria-label", `show no. ${mark.seq}`);
-  const cell = make("td", "nowrap", made);
+  const cell = make("td", "nowrap", label(made, `show no. ${mark.seq}`));
   if (state.results.axis !== "result") cell.append(make("small", "", place(state.results.axis, mark.x)));
   if (more) cell.append(make("small", "", more));
   return cell;
@@ -49,10 +48,9 @@ const interval = (value) => (value ? `${value.from.toFixed(2)} … ${value.to.to
 function row({ gauge, marks }) {
   const last = gauge.groups[gauge.groups.length - 1];
   const name = button(gauge.name, "plain", () => choose(gauge.slot));
-  name.setAttribute("aria-pressed", String(gauge.slot === state.slot));
-  const heading = make("th", "", name);
-  heading.scope = "row";
-  if (!last) return make("tr", "", heading, ...Array.from({ length: 7 }, (_, column) => make("td", "", column ? "" : "no values")));
+  name.setAttribute("aria-pressed", gauge.slot === state.slot);
+  const head = heading("row", name);
+  if (!last) return make("tr", "", head, ...Array.from({ length: 7 }, (_, column) => make("td", "", column ? "" : "no values")));
   const known = gauge.columns.filter(Boolean), every = Math.ceil(known.length / 100);
   const means = known.filter((_, column) => column % every === 0).map(({ mean: value }) => ({ value, pass: true }));
   const chart = trend(means, { unit: gauge.unit, lowest: last.low, highest: last.high });
@@ -61,7 +59,7 @@ function row({ gauge, marks }) {
   const n = make("td", "", count(last.n));
   if (gauge.groups.length > 1) n.append(make("small", "", `last of ${gauge.groups.length} groups`));
   const drifted = marks && marks.drift;
-  return make("tr", "", heading, make("td", "trend-cell", chart), n, mean, make("td", "nowrap", last.s === null ? "–" : quantity(last.s, gauge.unit, 1)), cpk,
+  return make("tr", "", head, make("td", "trend-cell", chart), n, mean, make("td", "nowrap", last.s === null ? "–" : quantity(last.s, gauge.unit, 1)), cpk,
     marks && marks.first ? opened(marks.first, `first of ${count(marks.marks)}`) : make("td", "", marks ? "none" : "…"),
     drifted ? opened(drifted, "drifts from here") : make("td", "", marks ? "no drift" : "…"));
 }
@@ -154,7 +152,7 @@ async function detail() {
     if (part.part !== "end") found[part.part === "results" ? "results" : part.part] = part;
   });
   if (!all) return;
-  show("chart-card", Boolean(found.gauge && found.gauge.groups.length));
+  show("chart-card", found.gauge && found.gauge.groups.length);
   if (!found.gauge || !found.gauge.groups.length) return;
   const before = state.detail;
   state.detail = found;
@@ -277,15 +275,15 @@ export function start() {
     show("statistics-range", $("statistics-period").value === "range");
     show("statistics-shift", $("statistics-period").value === "shift");
   };
-  $("statistics-form").addEventListener("submit", (event) => { event.preventDefault(); localStorage.setItem("shifts", shifts.value); load(); });
-  for (const id of ["statistics-period", "statistics-axis"]) $(id).addEventListener("change", () => { fields(); if ($(id).value !== "range") load(); });
-  $("run-chart").addEventListener("keydown", keys);
+  on($("statistics-form"), "submit", () => { localStorage.setItem("shifts", shifts.value); load(); });
+  for (const id of ["statistics-period", "statistics-axis"]) on($(id), "change", () => { fields(); if ($(id).value !== "range") load(); });
+  on($("run-chart"), "keydown", keys);
   pointer($("run-chart"));
-  $("chart-open").addEventListener("click", () => openColumn());
-  $("chart-range").addEventListener("click", openRange);
-  $("chart-close").addEventListener("click", () => { state.slot = null; rows(); show("chart-card", false); });
+  on($("chart-open"), "click", () => openColumn());
+  on($("chart-range"), "click", openRange);
+  on($("chart-close"), "click", () => { state.slot = null; rows(); show("chart-card", false); });
   let width = 0;
-  window.addEventListener("resize", () => {
+  on(window, "resize", () => {
     if (state.detail && !$("chart-card").hidden && chartWidth() !== width) { width = chartWidth(); drawDetail(); }
   });
 }

@@ -1,7 +1,7 @@
 // The steps from a bare head to the first recipe: each can be run, and says what it found and what to do.
-import { $, fill, make, show, text } from "./element.js";
+import { $, disable, fill, make, on, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change, notice } from "./session.js";
+import { change, needs, notice } from "./session.js";
 import { moment } from "./number.js";
 import { exposure } from "./live.js";
 import { teachNext } from "./recipes.js";
@@ -58,7 +58,7 @@ function showStep(step, running, busy) {
   bar.value = now ? now.share : 0;
   place.querySelector(".now").textContent = now ? now.said : "";
   place.querySelector(".at").textContent = step.at_unix_s ? `last run ${moment({ utc_us: 1e6 * step.at_unix_s })}` : "";
-  for (const button of place.querySelectorAll("button:not(.open, .end)")) button.disabled = busy;
+  for (const button of place.querySelectorAll("button:not(.open, .end)")) disable(button, busy);
   place.querySelector(".end").hidden = !now;
   announce(step);
 }
@@ -94,21 +94,23 @@ function furnish(name, at) {
   summary.append(make("span", "state", tick, " ", make("span", "is")));
   const act = place.lastElementChild;
   act.className = "strong";
-  act.addEventListener("click", () => run(name));
+  on(act, "click", () => run(name));
+  needs(act, `POST /api/${name === "teach" ? "recipes/{number}/teach" : "head/steps/{name}"}`);
   const bar = make("progress", "bar");
   bar.max = 1;
   bar.setAttribute("aria-label", `how far ${title(name)} is`);
   const end = make("button", "end", "Stop this step");
   end.type = "button";
   end.hidden = true;
-  end.addEventListener("click", () => change(() => ask("DELETE", `api/head/steps/${name}`)));
+  on(end, "click", () => change(() => ask("DELETE", `api/head/steps/${name}`)));
+  needs(end, "DELETE /api/head/steps/{name}");
   for (const part of [make("ul", "said"), make("p", "remedy"), bar, make("p", "now quiet"), end]) place.insertBefore(part, act);
   place.append(make("span", "at quiet"));
 }
 
 export function start() {
   NAMES.forEach(furnish);
-  $("bare-next").addEventListener("click", () => {
+  on($("bare-next"), "click", () => {
     const place = $(`step-${state.next}`);
     place.open = true;
     place.querySelector("summary").focus({ preventScroll: true });

@@ -1,7 +1,7 @@
 // Guided studies: begins one, asks for part, appraiser and trial one after the other, and shows the report.
-import { $, button, fill, make, show, text } from "./element.js";
+import { $, button, cells, fill, heading, label, make, on, scrolling, show, text } from "./element.js";
 import { ask } from "./api.js";
-import { change, notice } from "./session.js";
+import { change, needs, notice } from "./session.js";
 import { choose } from "./question.js";
 import { quantity } from "./number.js";
 
@@ -13,7 +13,6 @@ let open = null;
 let made = "";
 
 const path = (number, what = "") => `api/studies/${number}${what}`;
-const label = (element, words) => { element.setAttribute("aria-label", words); return element; };
 
 async function list() {
   const { studies } = await ask("GET", "api/studies");
@@ -21,8 +20,8 @@ async function list() {
   fill($("study-rows"), ...studies.map((study) => {
     const look = label(button(String(study.number), "open", () => openStudy(study.number)), `open study ${study.number}`);
     const drop = label(button("Delete", "", () => change(() => remove(study))), `Delete study ${study.number}`);
-    const cells = study.error ? [study.error, "", ""] : [study.name, String(study.recipe), `${study.taken} of ${study.all}`];
-    return make("tr", "", make("td", "", look), ...cells.map((words) => make("td", "", words)), make("td", "actions", drop));
+    const words = study.error ? [study.error, "", ""] : [study.name, String(study.recipe), `${study.taken} of ${study.all}`];
+    return make("tr", "", ...cells(look, ...words), make("td", "actions", needs(drop, "DELETE /api/studies/{number}")));
   }));
 }
 
@@ -70,13 +69,13 @@ function cell(study, of, words) {
   if (!taken) return make("td", now ? "now" : "", now ? "next" : "·");
   const again = label(button(String(taken.seq), "open", () => change(() => run(of))), `result ${taken.seq}: take ${words} again`);
   again.title = "take this trial again";
-  return make("td", now ? "now" : "", again);
+  return make("td", now ? "now" : "", needs(again, "POST /api/studies/{number}/{name}"));
 }
 
 function table(study) {
   const { parts, appraisers, trials } = study.asked;
   const columns = appraisers.flatMap((name, appraiser) => Array.from({ length: trials }, (_, trial) => ({ appraiser, trial, words: `${name ? `${name} ` : ""}${trial + 1}` })));
-  const head = make("tr", "", ...["Part", ...columns.map(({ words }) => words)].map((words) => { const made = make("th", "", words); made.scope = "col"; return made; }));
+  const head = make("tr", "", ...["Part", ...columns.map(({ words }) => words)].map((words) => heading("col", words)));
   const rows = parts.map((name, part) => make("tr", "", make("td", "", name), ...columns.map(({ appraiser, trial, words }) => cell(study, { part, appraiser, trial }, `part ${name}, ${words},`))));
   fill($("study-table"), make("thead", "", head), make("tbody", "", ...rows));
 }
@@ -111,14 +110,8 @@ async function run(again) {
 const digits = (number, many = 4) => (number === null ? "not defined" : number === 0 ? "0" : Math.abs(number) < 1e-4 ? number.toExponential(2) : String(Number(number.toPrecision(many))));
 const TAGS = { fit: "pass", "not fit": "fail" };
 
-// A table that scrolls where it is wider than the screen, also by keys.
 function rows(name, head, lines) {
-  const row = (kind, words) => make("tr", "", ...words.map((one) => make(kind, "", one)));
-  const place = label(make("div", "scroll"), name);
-  place.tabIndex = 0;
-  place.setAttribute("role", "region");
-  place.append(make("table", "list", make("thead", "", row("th", head)), make("tbody", "", ...lines.map((words) => row("td", words)))));
-  return place;
+  return scrolling(name, make("thead", "", make("tr", "", ...head.map((one) => heading("col", one)))), make("tbody", "", ...lines.map((words) => make("tr", "", ...cells(...words)))));
 }
 
 function judged(study) {
@@ -177,11 +170,11 @@ export function openStudies(open_view, now) {
 }
 
 export function start() {
-  $("study-recipe").addEventListener("change", () => gauges().catch((error) => { fill($("study-slots")); notice(error.message, true); }));
-  $("study-begin").addEventListener("submit", (event) => { event.preventDefault(); change(begin); });
-  $("study-close").addEventListener("click", close);
-  $("study-run").addEventListener("click", () => change(async () => {
+  on($("study-recipe"), "change", () => gauges().catch((error) => { fill($("study-slots")); notice(error.message, true); }));
+  on($("study-begin"), "submit", () => change(begin));
+  on($("study-close"), "click", close);
+  on($("study-run"), "click", () => change(async () => {
     if (open.running) showStudy(await ask("POST", path(open.number, "/pause"))); else await run(null);
   }));
-  $("study-trigger").addEventListener("click", () => change(() => ask("POST", "api/trigger")));
+  on($("study-trigger"), "click", () => change(() => ask("POST", "api/trigger")));
 }

@@ -1,5 +1,5 @@
 // The verdict in shape, words and colour, readable from a distance.
-import { $, make, text } from "./element.js";
+import { $, heading, make, text } from "./element.js";
 import { clock, quantity } from "./number.js";
 
 const SENTENCES = {
@@ -55,9 +55,7 @@ export function wrong({ value, unit }, { low, absent }) {
 
 // The element that names a gauge, with its place in the registers.
 export function named({ name, slot }) {
-  const made = make("th", "", name, make("small", "", `slot ${slot}`));
-  made.scope = "row";
-  return made;
+  return heading("row", name, make("small", "", `slot ${slot}`));
 }
 
 // "deviation +0.612 mm too high, opening 4 absent"
