@@ -4,7 +4,7 @@ use crate::changeover::select;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY};
 use crate::written::FRINGED;
-use appliance::access::Record;
+use appliance::access::ChangeRecord;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -26,8 +26,8 @@ fn user(daemon: &Daemon, name: &str) -> Browser {
     browser
 }
 
-fn record(place: &Place) -> Record {
-    Record::of(&place.path("state"), 16 << 20)
+fn record(place: &Place) -> ChangeRecord {
+    ChangeRecord::of(&place.path("state"), 16 << 20)
 }
 
 #[test]

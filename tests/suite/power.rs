@@ -3,7 +3,7 @@
 
 use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
-use appliance::access::{Access, Record};
+use appliance::access::{Access, ChangeRecord};
 use appliance::history::{self, Bounds, Filter, Numbering, OpenedHistory, Reader};
 use appliance::recipe::Store;
 use appliance::recipe::file::archive;
@@ -232,7 +232,7 @@ impl Promise {
         }
         let words = |error: &dyn std::fmt::Display| error.to_string();
         let folder = StateFolder::open(state).map_err(|error| words(&error))?;
-        let record = Record::of(state, 16 << 20);
+        let record = ChangeRecord::of(state, 16 << 20);
         let opened = Access::open(&state.join("access"), None, record.clone());
         let made = opened.map_err(|error| words(&error))?.made;
         if self.begun && made.is_some() {

@@ -5,7 +5,7 @@
 //! Whoever may write the state folder can write the whole chain anew: it finds accidents and
 //! alterations of single lines, and is no signature.
 
-use super::record::{Record, hash_of, number_of};
+use super::record::{ChangeRecord, hash_of, number_of};
 use serde::{Deserialize, Serialize};
 use std::io;
 
@@ -56,7 +56,7 @@ struct Link {
     first: Option<u32>,
 }
 
-impl Record {
+impl ChangeRecord {
     /// Checks the chain.
     ///
     /// # Errors

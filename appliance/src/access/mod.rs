@@ -16,7 +16,7 @@ mod secret;
 mod sessions;
 pub mod users;
 
-pub use record::{Change, Record, Way};
+pub use record::{Change, ChangeRecord, Way};
 pub use role::Role;
 pub use secret::NewSecret;
 pub use sessions::{MAX_AGE_S, Token};
@@ -42,7 +42,7 @@ struct AccessState {
     logins: Mutex<Logins>,
     /// One password is hashed at a time: argon2id takes 19 MiB and a core.
     guessing: Mutex<()>,
-    record: Record,
+    record: ChangeRecord,
 }
 
 #[derive(Debug)]
@@ -110,7 +110,7 @@ impl Access {
     /// # Errors
     /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used
     /// (78).
-    pub fn open(folder: &Path, given: Option<&Path>, record: Record) -> Result<OpenedAccess> {
+    pub fn open(folder: &Path, given: Option<&Path>, record: ChangeRecord) -> Result<OpenedAccess> {
         let what = format!("open {}", folder.display());
         std::fs::create_dir_all(folder).map_err(Exit::CannotCreate.because(&what))?;
         let (hash, made) = match given.map_or(Ok(None), secret::given)? {
@@ -322,7 +322,7 @@ impl Access {
     }
 
     /// The record of changes.
-    pub fn record(&self) -> &Record {
+    pub fn record(&self) -> &ChangeRecord {
         &self.0.record
     }
 

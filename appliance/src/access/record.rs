@@ -92,7 +92,7 @@ pub fn recipe_of(subject: &str) -> Option<u16> {
 
 /// A line of the record.
 #[derive(Serialize)]
-struct Line<'a> {
+struct RecordLine<'a> {
     number: u32,
     /// The hash of the line before, 64 hexadecimal digits.
     previous: &'a str,
@@ -140,14 +140,14 @@ impl RecordFilter {
 
 /// The record of a device. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Record {
+pub struct ChangeRecord {
     folder: PathBuf,
     counter: Counter,
     /// The most bytes of both files.
     most: u64,
 }
 
-impl Record {
+impl ChangeRecord {
     /// That of a state folder, at most `most` bytes; the oldest lines are dropped.
     pub fn of(state: &Path, most: u64) -> Self {
         Self {
@@ -217,7 +217,7 @@ impl Record {
             false => written,
         };
         let number = number.saturating_add(1);
-        let line = Line {
+        let line = RecordLine {
             number,
             previous: &hash,
             first: begins.then(|| self.first().ok().flatten().unwrap_or(number)),

@@ -11,7 +11,7 @@ const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
 const PASSWORD: &str = "correct horse battery";
 
 fn open(folder: &Path) -> (Access, Option<NewSecret>) {
-    let opened = Access::open(folder, None, Record::of(folder, 1 << 20)).unwrap();
+    let opened = Access::open(folder, None, ChangeRecord::of(folder, 1 << 20)).unwrap();
     assert_eq!(opened.complaint, None);
     (opened.access, opened.made)
 }
@@ -50,7 +50,7 @@ fn a_secret_that_was_given_goes_before_the_stored_one_and_leaves_it_alone() {
     let (folder, given) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let file = given.path().join("secret");
     let open = || {
-        let record = Record::of(folder.path(), 1 << 20);
+        let record = ChangeRecord::of(folder.path(), 1 << 20);
         let opened = Access::open(folder.path(), Some(&file), record).unwrap();
         (opened.access, opened.made)
     };
@@ -172,6 +172,7 @@ fn what_no_user_may_be_is_refused_with_the_remedy() {
         ("Engineer", Role::Viewer, Some(PASSWORD), "device's secret"),
         ("a b", Role::Viewer, Some(PASSWORD), "letters, digits"),
         ("", Role::Viewer, Some(PASSWORD), "letters, digits"),
+        ("..", Role::Viewer, Some(PASSWORD), "letters, digits"),
     ] {
         let refused = set(name, role, password);
         assert!(refused.contains(words), "{name:?}: {refused}");
@@ -232,8 +233,8 @@ fn a_host_with_many_ipv6_addresses_is_one_guesser() {
     assert!(waits(3) && !waits(4));
 }
 
-fn record(state: &Path, most: u64) -> Record {
-    Record::of(state, most)
+fn record(state: &Path, most: u64) -> ChangeRecord {
+    ChangeRecord::of(state, most)
 }
 
 fn change(subject: &str) -> Change {
@@ -245,7 +246,7 @@ fn change(subject: &str) -> Change {
 }
 
 /// A record of nine lines in a state folder.
-fn nine() -> (tempfile::TempDir, Record) {
+fn nine() -> (tempfile::TempDir, ChangeRecord) {
     let folder = tempfile::tempdir().unwrap();
     let record = record(folder.path(), 1 << 20);
     for number in 1..=9 {

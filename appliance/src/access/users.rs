@@ -196,7 +196,9 @@ pub fn parsed(bytes: Vec<u8>) -> Result<Vec<User>, String> {
 /// In words, with the remedy.
 pub(super) fn check_name(name: &str) -> Result<(), String> {
     let allowed = |c: char| c.is_alphanumeric() || ".-_".contains(c);
-    if name.is_empty() || name.chars().count() > LONGEST_NAME || !name.chars().all(allowed) {
+    // Browsers take names of dots alone for steps in a path.
+    let dots = name.chars().all(|c| c == '.');
+    if dots || name.chars().count() > LONGEST_NAME || !name.chars().all(allowed) {
         return Err(format!(
             "a user's name has 1 to {LONGEST_NAME} letters, digits, \".\", \"-\" or \"_\": choose another"
         ));

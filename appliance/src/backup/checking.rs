@@ -28,7 +28,7 @@ const LONGEST_NAME: usize = 255;
 
 /// A backup that was checked.
 #[derive(Clone, Debug)]
-pub struct Checked {
+pub struct CheckedBackup {
     /// Its manifest.
     pub manifest: Manifest,
     /// What its history holds.
@@ -42,7 +42,7 @@ impl Backups {
     ///
     /// # Errors
     /// In words: what is wrong with it. Then the one before is gone as well, and the state untouched.
-    pub fn check(&self, archive: &Path) -> Result<Checked, String> {
+    pub fn check(&self, archive: &Path) -> Result<CheckedBackup, String> {
         self.forget().map_err(|error| error.to_string())?;
         let checked = File::open(archive)
             .map_err(|error| error.to_string())
@@ -58,7 +58,7 @@ impl Backups {
 ///
 /// # Errors
 /// In words: what is wrong with it.
-pub fn check(archive: File, into: &Path) -> Result<Checked, String> {
+pub fn check(archive: File, into: &Path) -> Result<CheckedBackup, String> {
     let size = archive.metadata().map_err(|error| error.to_string())?.len();
     let mut members = Members::open(archive, MOST).map_err(|error| error.to_string())?;
     let manifest = manifest(&mut members)?;
@@ -187,7 +187,7 @@ fn unpack<R: Read + Seek>(
 
 /// Reads what was unpacked by the code that would read it in its place. Recipes are named one by one
 /// in the plan.
-fn formats(manifest: Manifest, folder: &Path) -> Result<Checked, String> {
+fn formats(manifest: Manifest, folder: &Path) -> Result<CheckedBackup, String> {
     let has = |name: &str| folder.join(name).is_file();
     let history = match has(DATABASE[0]) {
         true => Some(carry::check(&folder.join(DATABASE[0])).map_err(|error| error.to_string())?),
@@ -217,7 +217,7 @@ fn formats(manifest: Manifest, folder: &Path) -> Result<Checked, String> {
         let read = studies.read(number);
         read.map_err(|error| error.to_string())?;
     }
-    Ok(Checked {
+    Ok(CheckedBackup {
         manifest,
         history,
         users,

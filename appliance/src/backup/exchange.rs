@@ -9,10 +9,10 @@
 //! Numbers of results are not exchanged: they go on behind all that either state has used. Nor is the
 //! record of changes, which says who ordered the restore.
 
-use super::checking::Checked;
+use super::checking::CheckedBackup;
 use super::plan::RestorePlan;
-use super::{Backups, DATABASE, OF_HEAD, Part, RECIPES, RECORDINGS, STUDIES, USERS};
-use crate::access::{Change, Record, Way};
+use super::{Backups, DATABASE, OF_HEAD, RECIPES, RECORDINGS, RestorePart, STUDIES, USERS};
+use crate::access::{Change, ChangeRecord, Way};
 use crate::error::{Exit, Failure, Result};
 use crate::history::carry;
 use crate::history::is_after;
@@ -43,7 +43,7 @@ struct CheckedFile {
 
 /// A folder or file that is exchanged.
 #[derive(Debug, Serialize, Deserialize)]
-struct Item {
+struct ExchangedItem {
     name: String,
     /// Whether something takes its place.
     comes: bool,
@@ -51,11 +51,11 @@ struct Item {
 
 /// A restore that is ordered or done.
 #[derive(Debug, Serialize, Deserialize)]
-struct Order {
-    what: Part,
+struct RestoreOrder {
+    what: RestorePart,
     by: String,
     at_unix_ms: Option<u64>,
-    items: Vec<Item>,
+    items: Vec<ExchangedItem>,
     /// The id of the history that comes back.
     history: Option<String>,
     /// Whether serial and results of another device are taken over.
@@ -69,7 +69,7 @@ struct Order {
 #[serde(deny_unknown_fields)]
 pub struct RestoreChoice {
     /// What comes back.
-    pub what: Part,
+    pub what: RestorePart,
     /// With everything: also the users.
     #[serde(default)]
     pub users: bool,
@@ -97,7 +97,7 @@ impl Backups {
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub fn offer(&self, checked: &Checked, plan: &RestorePlan) -> io::Result<()> {
+    pub fn offer(&self, checked: &CheckedBackup, plan: &RestorePlan) -> io::Result<()> {
         let file = CheckedFile {
             serial: checked.manifest.serial.clone(),
             history: checked.history.as_ref().map(|history| history.id.clone()),
@@ -108,9 +108,9 @@ impl Backups {
 
     /// What was checked, what is ordered, and which state before is kept.
     pub fn shown(&self) -> Value {
-        let order: Option<Order> = self.read(ORDER);
+        let order: Option<RestoreOrder> = self.read(ORDER);
         let checked: Option<CheckedFile> = self.read(CHECKED);
-        let done: Option<Order> = self.read(DONE).filter(|_| self.before().exists());
+        let done: Option<RestoreOrder> = self.read(DONE).filter(|_| self.before().exists());
         json!({
             "checked": checked.filter(|_| order.is_none()).map(|checked| checked.plan),
             "ordered": order.map(|order| json!({ "what": order.what, "by": order.by })),
@@ -146,7 +146,7 @@ impl Backups {
         }
         let is_same = checked.serial == serial;
         let replaces = choice.replaces_device && !is_same;
-        let all = choice.what == Part::Everything;
+        let all = choice.what == RestorePart::Everything;
         if choice.replaces_device && (is_same || !all) {
             let words = "replaces_device belongs to everything of another device: leave it out";
             return Err(OrderError::Refused(words.into()));
@@ -157,10 +157,10 @@ impl Backups {
             return Err(OrderError::Refused(words.into()));
         }
         let mut names = Vec::new();
-        if choice.what != Part::Recipes {
+        if choice.what != RestorePart::Recipes {
             names.extend(OF_HEAD);
         }
-        if choice.what != Part::Calibration {
+        if choice.what != RestorePart::Calibration {
             names.push(RECIPES);
         }
         // Results belong to the device that has them.
@@ -193,28 +193,28 @@ impl Backups {
     /// [`OrderError`]
     pub fn order_undo(&self, by: &str) -> std::result::Result<(), OrderError> {
         let before = self.before();
-        let done: Option<Order> = self.read(DONE).filter(|_| before.exists());
+        let done: Option<RestoreOrder> = self.read(DONE).filter(|_| before.exists());
         let done = done.ok_or(OrderError::Nothing("no state before a restore is kept"))?;
         self.forget()?;
         let names: Vec<&str> = done.items.iter().map(|item| &*item.name).collect();
         let history = carry::check(&before.join(DATABASE[0])).ok();
         let history = history.map(|history| history.id);
-        self.write_order(Part::Undo, by, &before, &names, (history, false))
+        self.write_order(RestorePart::Undo, by, &before, &names, (history, false))
     }
 
     fn write_order(
         &self,
-        what: Part,
+        what: RestorePart,
         by: &str,
         from: &Path,
         names: &[&str],
         (history, replaces): (Option<String>, bool),
     ) -> std::result::Result<(), OrderError> {
-        let items = names.iter().map(|name| Item {
+        let items = names.iter().map(|name| ExchangedItem {
             name: (*name).to_owned(),
             comes: from.join(name).exists(),
         });
-        let order = Order {
+        let order = RestoreOrder {
             what,
             by: by.to_owned(),
             at_unix_ms: crate::system::clock::utc_us().map(|us| us / 1000),
@@ -247,10 +247,10 @@ impl Backups {
     pub fn carry_out(
         &self,
         state: &StateFolder,
-        record: &Record,
+        record: &ChangeRecord,
         utc_s: Option<u64>,
     ) -> Result<Option<String>> {
-        let order: Option<Order> = self.read(ORDER);
+        let order: Option<RestoreOrder> = self.read(ORDER);
         let Some(mut order) = order else {
             self.clean();
             return Ok(None);
@@ -263,7 +263,7 @@ impl Backups {
         if !order.begun {
             let prepared = self.prepare(state, &order, utc_s);
             if let Err(words) = prepared {
-                if order.what == Part::Undo && !self.before().exists() {
+                if order.what == RestorePart::Undo && !self.before().exists() {
                     rename_whole(&self.staged(), &self.before()).map_err(failed)?;
                 }
                 self.forget().map_err(failed)?;
@@ -299,12 +299,12 @@ impl Backups {
     fn prepare(
         &self,
         state: &StateFolder,
-        order: &Order,
+        order: &RestoreOrder,
         utc_s: Option<u64>,
     ) -> std::result::Result<(), String> {
         let words = |error: io::Error| error.to_string();
         let (staged, before) = (self.staged(), self.before());
-        match order.what == Part::Undo {
+        match order.what == RestorePart::Undo {
             // What lay in `before` takes the way of a backup.
             true if !staged.exists() => rename_whole(&before, &staged).map_err(words)?,
             true => {}
@@ -330,7 +330,7 @@ impl Backups {
     }
 
     /// Exchanges one item; done already, it changes nothing.
-    fn exchange(&self, item: &Item) -> io::Result<()> {
+    fn exchange(&self, item: &ExchangedItem) -> io::Result<()> {
         let present = self.state.join(&item.name);
         let (comes, goes) = (
             self.staged().join(&item.name),

@@ -5,7 +5,7 @@ use super::{
     Backups, CALIBRATION, CONFIGURATION, COUNTER, DATABASE, FORMAT, MANIFEST, Manifest,
     MemberEntry, OF_HEAD, RECIPES, RECORDINGS, STUDIES, USERS,
 };
-use crate::access::Record;
+use crate::access::ChangeRecord;
 use crate::head::calibration::place::CalibrationPlace;
 use crate::history::Reader;
 use crate::recipe::Store;
@@ -31,13 +31,13 @@ const ATTEMPTS: usize = 5;
 const PIECE: usize = 256 << 10;
 /// After each piece there is a rest of so many times the work on it, so that a cycle beside it has the
 /// cores and the memory, but not longer than this: a slow client has made it wait already.
-const REST: u32 = 3;
-const LONGEST_REST: Duration = Duration::from_millis(10);
+const REST: u32 = 6;
+const LONGEST_REST: Duration = Duration::from_millis(20);
 
 /// What a backup has beside recipes, calibration, history and record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Wanted {
+pub struct BackupContents {
     /// The users, with the hashes of their passwords.
     pub users: bool,
     /// The recordings of parts.
@@ -46,7 +46,7 @@ pub struct Wanted {
 
 /// What is said of a device in its backup.
 #[derive(Clone, Debug)]
-pub struct Device {
+pub struct BackedUpDevice {
     /// Its serial.
     pub serial: String,
     /// Its configuration as it was read.
@@ -67,16 +67,16 @@ enum Content {
 /// A consistent snapshot of a device; dropping it removes its files.
 #[derive(Debug)]
 pub struct StateSnapshot {
-    scratch: Scratch,
+    scratch: MakingFolder,
     members: Vec<(String, Content)>,
     manifest: Manifest,
 }
 
 /// A folder that is removed when this is dropped; what a kill leaves is removed at the next start.
 #[derive(Debug)]
-struct Scratch(PathBuf);
+struct MakingFolder(PathBuf);
 
-impl Drop for Scratch {
+impl Drop for MakingFolder {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.0);
     }
@@ -89,19 +89,24 @@ impl Backups {
     /// In words, with the remedy.
     pub fn snapshot(
         &self,
-        device: &Device,
-        wanted: Wanted,
-        record: &Record,
+        device: &BackedUpDevice,
+        wanted: BackupContents,
+        record: &ChangeRecord,
     ) -> Result<StateSnapshot, String> {
         let failed = |error: io::Error| format!("back up: {error}: free space");
         self.taken(device, wanted, record).map_err(failed)
     }
 
-    fn taken(&self, device: &Device, wanted: Wanted, record: &Record) -> io::Result<StateSnapshot> {
+    fn taken(
+        &self,
+        device: &BackedUpDevice,
+        wanted: BackupContents,
+        record: &ChangeRecord,
+    ) -> io::Result<StateSnapshot> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let name = format!("making-{}-{count}", std::process::id());
-        let scratch = Scratch(self.path(&name));
+        let scratch = MakingFolder(self.path(&name));
         fs::create_dir_all(&scratch.0)?;
         let mut snapshot = StateSnapshot {
             members: Vec::new(),

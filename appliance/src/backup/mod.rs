@@ -74,7 +74,7 @@ pub struct MemberEntry {
 /// What comes back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Part {
+pub enum RestorePart {
     /// Everything.
     Everything,
     /// The recipes alone.
@@ -85,7 +85,7 @@ pub enum Part {
     Undo,
 }
 
-impl Part {
+impl RestorePart {
     /// Its name.
     pub fn word(self) -> &'static str {
         match self {

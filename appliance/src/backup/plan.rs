@@ -1,8 +1,8 @@
 //! What a backup that was checked would bring back, and what it would replace: for a person who
 //! chooses.
 
-use super::checking::Checked;
-use super::{Backups, CALIBRATION, CONFIGURATION, Part, RECIPES, RECORDINGS};
+use super::checking::CheckedBackup;
+use super::{Backups, CALIBRATION, CONFIGURATION, RECIPES, RECORDINGS, RestorePart};
 use crate::access::User;
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::CalibrationPlace;
@@ -43,7 +43,7 @@ pub struct RestorePlan {
     serial: String,
     same_device: bool,
     configuration_differs: bool,
-    choices: [Choice; 3],
+    choices: [RestoreOption; 3],
     recipes: Vec<RecipeRow>,
     /// Recipes that the backup lacks.
     removed: Vec<RemovedRow>,
@@ -55,8 +55,8 @@ pub struct RestorePlan {
 
 /// What may be chosen.
 #[derive(Clone, Debug, Serialize)]
-struct Choice {
-    what: Part,
+struct RestoreOption {
+    what: RestorePart,
     /// Why it is refused.
     refused: Option<String>,
 }
@@ -64,7 +64,7 @@ struct Choice {
 /// How what comes back compares with what is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-enum Found {
+enum Likeness {
     Same,
     Other,
     None,
@@ -75,7 +75,7 @@ struct RecipeRow {
     number: u16,
     name: String,
     fingerprint: String,
-    present: Found,
+    present: Likeness,
     /// Why it cannot be used.
     problem: Option<String>,
 }
@@ -89,7 +89,7 @@ struct RemovedRow {
 #[derive(Clone, Debug, Serialize)]
 struct CalibrationRow {
     fingerprint: String,
-    present: Found,
+    present: Likeness,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -110,7 +110,7 @@ struct UserRow {
 impl Backups {
     /// Plans a restore of what was checked; each recipe is planned on the head, which takes a core for
     /// seconds.
-    pub fn plan(&self, checked: &Checked, present: &Present<'_>) -> RestorePlan {
+    pub fn plan(&self, checked: &CheckedBackup, present: &Present<'_>) -> RestorePlan {
         let staged = self.staged();
         let loaded = CalibrationPlace::at(&staged.join(CALIBRATION)).load();
         let file = loaded.ok().flatten().map(|loaded| loaded.file);
@@ -129,7 +129,7 @@ impl Backups {
         let numbers: BTreeSet<u16> = recipes.iter().map(|row| row.number).collect();
         let mut removed = present.recipes.numbers();
         removed.retain(|number| !numbers.contains(number));
-        let refused = |what, refused| Choice { what, refused };
+        let refused = |what, refused| RestoreOption { what, refused };
         RestorePlan {
             made_at_unix_s: checked.manifest.made_at_unix_s,
             made_by: checked.manifest.made_by.clone(),
@@ -138,9 +138,9 @@ impl Backups {
             configuration_differs: fs::read(staged.join(CONFIGURATION))
                 .is_ok_and(|text| text != present.configuration.as_bytes()),
             choices: [
-                refused(Part::Everything, misfit),
-                refused(Part::Recipes, of_recipes),
-                refused(Part::Calibration, of_calibration),
+                refused(RestorePart::Everything, misfit),
+                refused(RestorePart::Recipes, of_recipes),
+                refused(RestorePart::Calibration, of_calibration),
             ],
             removed: removed
                 .into_iter()
@@ -187,11 +187,11 @@ impl Backups {
     }
 }
 
-fn found(present: Option<&str>, fingerprint: &str) -> Found {
+fn found(present: Option<&str>, fingerprint: &str) -> Likeness {
     match present {
-        None => Found::None,
-        Some(present) if present == fingerprint => Found::Same,
-        Some(_) => Found::Other,
+        None => Likeness::None,
+        Some(present) if present == fingerprint => Likeness::Same,
+        Some(_) => Likeness::Other,
     }
 }
 

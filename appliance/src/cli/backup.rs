@@ -5,11 +5,12 @@ use super::names;
 use super::options::{Files, Quiet};
 use crate::backup::Backups;
 use crate::backup::checking::check;
-use crate::backup::making::{Device, Wanted};
+use crate::backup::making::{BackedUpDevice, BackupContents};
 use crate::error::{Exit, Result};
 use crate::storage::archive::Scratch;
 use crate::storage::folder::write_whole_with;
 use crate::storage::state::StateFolder;
+use crate::system::computing;
 use std::fs::File;
 use std::io;
 use std::path::PathBuf;
@@ -50,6 +51,8 @@ impl Backup {
     }
 
     fn made(&self) -> Result<()> {
+        // A station may be measuring.
+        computing::give_way();
         let config = self.files.configuration()?;
         let state = self.files.state_folder()?;
         let what = format!("back up {}", state.display());
@@ -57,11 +60,11 @@ impl Backup {
             let none = "no station has used it: name its state folder with --state";
             Exit::Missing.because(&what)(none)
         })?;
-        let device = Device {
+        let device = BackedUpDevice {
             serial,
             configuration: toml::to_string(&config).unwrap_or_default(),
         };
-        let wanted = Wanted {
+        let wanted = BackupContents {
             users: self.users,
             recordings: self.recordings,
         };

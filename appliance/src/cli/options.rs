@@ -2,7 +2,7 @@
 //! head.
 
 use super::numbers::{address, number, numbers};
-use crate::access::{Change, Record};
+use crate::access::{Change, ChangeRecord};
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure, Result};
 use crate::head::placed::Placed;
@@ -131,9 +131,9 @@ impl Files {
     ///
     /// # Errors
     /// As [`Self::state_folder`].
-    pub fn record(&self) -> Result<Record> {
+    pub fn record(&self) -> Result<ChangeRecord> {
         let most = u64::from(self.configuration()?.access.record_mib) << 20;
-        Ok(Record::of(&self.state_folder()?, most))
+        Ok(ChangeRecord::of(&self.state_folder()?, most))
     }
 
     /// Records what a command has changed. That it was done is not taken back where this fails.

@@ -9,7 +9,7 @@ pub mod survey;
 
 pub use crate::system::caller::Caller;
 
-use crate::access::{Access, NewSecret, OpenedAccess, Record};
+use crate::access::{Access, ChangeRecord, NewSecret, OpenedAccess};
 use crate::backup::Backups;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure, Result};
@@ -104,7 +104,7 @@ impl Daemon {
         // From here on no thread waits until stderr is read.
         stderr::detach();
         let state = StateFolder::open(&path)?;
-        let record = Record::of(&path, u64::from(config.access.record_mib) << 20);
+        let record = ChangeRecord::of(&path, u64::from(config.access.record_mib) << 20);
         let utc_s = clock::utc_us().map(|us| us / 1_000_000);
         // Before anything of the state is used.
         if let Some(words) = Backups::of(&path).carry_out(&state, &record, utc_s)? {
@@ -263,7 +263,7 @@ fn opened_head(
 const SECRET: &str = "fringed.secret";
 
 /// Opens the access control; the secret of a new device is written to stderr here and never again.
-fn open_access(state: &StateFolder, record: Record, progress: &Progress) -> Result<Access> {
+fn open_access(state: &StateFolder, record: ChangeRecord, progress: &Progress) -> Result<Access> {
     let folder = state.path().join("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));

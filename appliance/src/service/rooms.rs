@@ -3,7 +3,7 @@
 
 use super::Daemon;
 use super::survey::Survey;
-use crate::access::{Access, Change, Record, Way};
+use crate::access::{Access, Change, ChangeRecord, Way};
 use crate::backup::Backups;
 use crate::config::{Config, Looking};
 use crate::error::{Exit, Result};
@@ -71,7 +71,11 @@ impl Rooms<'_> {
     }
 
     /// Records what the PLC orders, until nothing comes.
-    pub fn record(&self, record: Record, orders: Receiver<Option<(IpAddr, PlcOrder)>>) -> Room {
+    pub fn record(
+        &self,
+        record: ChangeRecord,
+        orders: Receiver<Option<(IpAddr, PlcOrder)>>,
+    ) -> Room {
         let (station, progress) = (self.station.clone(), self.progress.clone());
         spawn("recording orders", move || {
             while let Ok(Some((from, order))) = orders.recv() {

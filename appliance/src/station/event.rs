@@ -1,6 +1,6 @@
 //! What reaches the station (events) and what it wants done (effects).
 
-use std::net::IpAddr;
+use core::net::IpAddr;
 use std::sync::Arc;
 
 use super::clock::Micros;

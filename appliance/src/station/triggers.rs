@@ -8,7 +8,7 @@
 //! other client.
 
 use super::clock::Micros;
-use std::net::IpAddr;
+use core::net::IpAddr;
 use std::sync::Arc;
 
 /// Who triggers.
@@ -169,7 +169,7 @@ impl Requests {
 mod tests {
     use super::*;
 
-    const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+    const HERE: IpAddr = IpAddr::V4(core::net::Ipv4Addr::LOCALHOST);
     const FAST: Client = Client::Plc(1, HERE);
     const SLOW: Client = Client::Plc(2, HERE);
 

@@ -9,7 +9,7 @@ use super::request::{self, Query};
 use super::site::{Site, alone};
 use crate::access::Signed;
 use crate::backup::exchange::{OrderError, RestoreChoice};
-use crate::backup::making::{Device, Wanted};
+use crate::backup::making::{BackedUpDevice, BackupContents};
 use crate::backup::plan::Present;
 use crate::system::computing;
 use axum::Extension;
@@ -41,7 +41,7 @@ fn one(site: &Site) -> Answered<OwnedMutexGuard<()>> {
 }
 
 /// Makes a backup and sends it piece by piece.
-pub(super) async fn make(site: Site, Query(wanted): Query<Wanted>) -> Answered<Response> {
+pub(super) async fn make(site: Site, Query(wanted): Query<BackupContents>) -> Answered<Response> {
     let turn = one(&site)?;
     let serial = site.station.snapshot().identity.serial.clone();
     let name = format!("attachment; filename=\"fringed-{serial}-backup.zip\"");
@@ -50,7 +50,7 @@ pub(super) async fn make(site: Site, Query(wanted): Query<Wanted>) -> Answered<R
         let _turn = turn;
         // The measuring task needs the cores.
         computing::give_way();
-        let device = Device {
+        let device = BackedUpDevice {
             serial,
             configuration: site.configuration.clone(),
         };

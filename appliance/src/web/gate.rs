@@ -17,7 +17,9 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use serde_json::{Map, Value};
 use std::net::{IpAddr, Ipv6Addr};
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -51,6 +53,10 @@ pub struct Rule {
     /// The name of the change in the record; none if nothing is changed.
     pub changes: Option<&'static str>,
 }
+
+/// The least role of each route that needs more than a viewer, by method and path.
+#[derive(Clone, Debug)]
+pub struct Needs(pub Arc<Map<String, Value>>);
 
 /// What a change has changed: an extension of the answer, for the record.
 #[derive(Clone, Debug, Default)]

@@ -2,7 +2,7 @@
 //! accepted within their limits and closed where they are too slow.
 
 use super::gate::Least::{self, Anyone, Collector, User};
-use super::gate::{self, Peer, Rule, own_page_only};
+use super::gate::{self, Needs, Peer, Rule, own_page_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::slots::{Slot, Slots};
@@ -203,6 +203,18 @@ pub fn routes() -> Vec<Route> {
     ]
 }
 
+/// The least role of each route that needs more than a viewer.
+fn needs() -> Needs {
+    let needs = routes().into_iter().filter_map(|route| match route.least {
+        User(role) if role > Viewer => Some((
+            format!("{} {}", route.method, route.path),
+            role.word().into(),
+        )),
+        _ => None,
+    });
+    Needs(Arc::new(needs.collect()))
+}
+
 /// All paths.
 pub fn router(site: Site) -> Router {
     let mut router = Router::new();
@@ -226,6 +238,7 @@ pub fn router(site: Site) -> Router {
     router = router.route(assets::ICON.path, get(async || assets::ICON.answer()));
     router
         .fallback(|| async { Problem::missing("there is no such page; start at /") })
+        .layer(Extension(needs()))
         .layer(from_fn_with_state(site.clone(), guarded))
         .with_state(site)
 }

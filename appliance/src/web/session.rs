@@ -1,9 +1,8 @@
 //! Sessions: signing in and out, and a user's own password.
 
-use super::gate::{self, COOKIE, Changed, Least, Peer};
+use super::gate::{self, COOKIE, Changed, Needs, Peer};
 use super::problem::{Answered, Problem, ProblemWords};
 use super::request;
-use super::server::routes;
 use super::site::Site;
 use crate::access::{MAX_AGE_S, Refused, Role, Token, UserError};
 use crate::station::Micros;
@@ -15,7 +14,7 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::time::Instant;
 
 /// The body of a sign-in.
@@ -39,24 +38,18 @@ struct NewPassword {
 }
 
 /// Who is signed in, and which routes need more than a viewer.
-pub(super) async fn state(site: Site, headers: HeaderMap) -> Json<Value> {
+pub(super) async fn state(
+    site: Site,
+    Extension(Needs(needs)): Extension<Needs>,
+    headers: HeaderMap,
+) -> Json<Value> {
     let signed = gate::signed_in(&site, &headers);
-    let needs: Map<String, Value> = routes()
-        .into_iter()
-        .filter_map(|route| match route.least {
-            Least::User(role) if role > Role::Viewer => Some((
-                format!("{} {}", route.method, route.path),
-                role.word().into(),
-            )),
-            _ => None,
-        })
-        .collect();
     let looking = match site.looking_is_open {
         true => "anyone",
         false => "signed-in",
     };
     Json(json!({
-        "signed_in": signed.is_some(), "looking": looking, "needs": needs,
+        "signed_in": signed.is_some(), "looking": looking, "needs": *needs,
         "user": signed.as_ref().map(|signed| &signed.name),
         "role": signed.map_or(Role::Viewer, |signed| signed.role),
     }))

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 /// What a user is to be.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Wanted {
+struct WantedUser {
     role: Role,
     /// Password or PIN; it stays where it is left out.
     secret: Option<String>,
@@ -41,7 +41,7 @@ pub(super) async fn set(
     Extension(signed): Extension<Signed>,
     request: Request,
 ) -> Answered<(Extension<Changed>, Json<Value>)> {
-    let Wanted { role, secret } = request::json(request).await?;
+    let WantedUser { role, secret } = request::json(request).await?;
     let set = site.change(move |site| {
         let since = (clock::utc_us(), &*signed.name);
         Ok(site

@@ -2,7 +2,7 @@
 
 use super::part::PART;
 use super::plant::{runtime, settings};
-use appliance::access::{Access, Record};
+use appliance::access::{Access, ChangeRecord};
 use appliance::backup::Backups;
 use appliance::history::Reader;
 use appliance::history::studies::Studies;
@@ -58,7 +58,7 @@ impl Page {
         let folder = tempfile::tempdir().expect("a folder");
         let station = Station::new(settings(), Micros(0));
         let station = StationHandle::new(station, Instant::now(), |_| None);
-        let record = Record::of(folder.path(), 1 << 20);
+        let record = ChangeRecord::of(folder.path(), 1 << 20);
         let opened = Access::open(&folder.path().join("access"), None, record).expect("access");
         let access = opened.access;
         let recipes = folder.path().join("recipes");

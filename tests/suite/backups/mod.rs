@@ -8,7 +8,7 @@ use crate::history::recording;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place};
 use crate::written::program;
-use appliance::backup::checking::{Checked, check};
+use appliance::backup::checking::{CheckedBackup, check};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -58,7 +58,7 @@ fn backup(browser: &mut Browser, more: &str) -> Vec<u8> {
     zip
 }
 
-fn checked(zip: &[u8]) -> (tempfile::TempDir, Result<Checked, String>) {
+fn checked(zip: &[u8]) -> (tempfile::TempDir, Result<CheckedBackup, String>) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("backup.zip");
     fs::write(&file, zip).unwrap();

@@ -26,8 +26,8 @@ function lines() {
     for (const { number, name } of removed) found.push([`recipe ${number} · ${name}`, "none", "is put aside"]);
   }
   if (what !== "recipes" && calibration) found.push(["calibration", calibration.fingerprint.slice(0, 8), PRESENT[calibration.present]]);
-  if (all && history) found.push(["results", results(history.results, history.last), results(history.present_results, history.present_last)]);
-  else if (all) found.push(["results", `of ${plan.serial}`, ticked("replaces") ? "are replaced" : "stay"]);
+  if (all && history && (plan.same_device || ticked("replaces"))) found.push(["results", results(history.results, history.last), results(history.present_results, history.present_last)]);
+  else if (all) found.push(["results", `of ${plan.serial}`, "stay"]);
   if (users && ticked("users")) for (const { name, role, present_role: now } of users) found.push([`user ${name}`, role, now || "none"]);
   if (all && recordings) found.push(["recordings of parts", String(recordings), ""]);
   if (differs) found.push(["configuration", "as fringed.toml", "differs, is not restored"]);

@@ -18,7 +18,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
-use crate::access::{Access, Record};
+use crate::access::{Access, ChangeRecord};
 use crate::backup::Backups;
 use crate::history::Reader;
 use crate::history::studies::Studies;
@@ -61,7 +61,7 @@ async fn served_to(looking_is_open: bool) -> Served {
     };
     let folder = tempfile::tempdir().unwrap();
     let handle = StationHandle::new(Station::new(settings, Micros(0)), Instant::now(), |_| None);
-    let record = Record::of(folder.path(), 16 << 20);
+    let record = ChangeRecord::of(folder.path(), 16 << 20);
     let opened = Access::open(&folder.path().join("access"), None, record).unwrap();
     let (dates, dated) = mpsc::channel();
     let (orders, _) = mpsc::channel();
