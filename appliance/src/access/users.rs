@@ -73,7 +73,7 @@ pub(super) struct Users {
 }
 
 /// Whether two names are those of one user.
-pub(super) fn is_same(one: &str, other: &str) -> bool {
+pub fn is_same(one: &str, other: &str) -> bool {
     one.to_lowercase() == other.to_lowercase()
 }
 

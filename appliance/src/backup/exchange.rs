@@ -10,7 +10,6 @@
 //! record of changes, which says who ordered the restore.
 
 use super::checking::CheckedBackup;
-use super::plan::RestorePlan;
 use super::{Backups, DATABASE, OF_HEAD, RECIPES, RECORDINGS, RestorePart, STUDIES, USERS};
 use crate::access::{Change, ChangeRecord, Way};
 use crate::error::{Exit, Failure, Result};
@@ -97,11 +96,11 @@ impl Backups {
     ///
     /// # Errors
     /// Whatever the file system answers.
-    pub fn offer(&self, checked: &CheckedBackup, plan: &RestorePlan) -> io::Result<()> {
+    pub fn offer(&self, checked: &CheckedBackup, plan: Value) -> io::Result<()> {
         let file = CheckedFile {
             serial: checked.manifest.serial.clone(),
             history: checked.history.as_ref().map(|history| history.id.clone()),
-            plan: json!(plan),
+            plan,
         };
         self.write(CHECKED, &file)
     }

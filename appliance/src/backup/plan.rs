@@ -1,17 +1,16 @@
-//! What a backup that was checked would bring back, and what it would replace: for a person who
-//! chooses.
+//! What a backup that was checked would bring back, and what it would replace: JSON for the page, where
+//! a person chooses.
 
 use super::checking::CheckedBackup;
 use super::{Backups, CALIBRATION, CONFIGURATION, RECIPES, RECORDINGS, RestorePart};
 use crate::access::User;
+use crate::access::users::is_same;
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::CalibrationPlace;
 use crate::history::Reader;
+use crate::recipe::Store;
 use crate::recipe::plan::Plan;
-use crate::recipe::store::manifest_at;
-use crate::recipe::{RecipeFile, Store};
-use serde::Serialize;
-use std::collections::BTreeSet;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
@@ -35,163 +34,78 @@ pub struct Present<'a> {
     pub calibrated_elsewhere: bool,
 }
 
-/// What a restore would do.
-#[derive(Clone, Debug, Serialize)]
-pub struct RestorePlan {
-    made_at_unix_s: u64,
-    made_by: String,
-    serial: String,
-    same_device: bool,
-    configuration_differs: bool,
-    choices: [RestoreOption; 3],
-    recipes: Vec<RecipeRow>,
-    /// Recipes that the backup lacks.
-    removed: Vec<RemovedRow>,
-    calibration: Option<CalibrationRow>,
-    history: Option<HistoryRow>,
-    users: Option<Vec<UserRow>>,
-    recordings: usize,
-}
-
-/// What may be chosen.
-#[derive(Clone, Debug, Serialize)]
-struct RestoreOption {
-    what: RestorePart,
-    /// Why it is refused.
-    refused: Option<String>,
-}
-
-/// How what comes back compares with what is there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Likeness {
-    Same,
-    Other,
-    None,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct RecipeRow {
-    number: u16,
-    name: String,
-    fingerprint: String,
-    present: Likeness,
-    /// Why it cannot be used.
-    problem: Option<String>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct RemovedRow {
-    number: u16,
-    name: String,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct CalibrationRow {
-    fingerprint: String,
-    present: Likeness,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct HistoryRow {
-    results: u64,
-    last: Option<u32>,
-    present_results: u64,
-    present_last: Option<u32>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-struct UserRow {
-    name: String,
-    role: crate::access::Role,
-    present_role: Option<crate::access::Role>,
-}
-
 impl Backups {
     /// Plans a restore of what was checked; each recipe is planned on the head, which takes a core for
     /// seconds.
-    pub fn plan(&self, checked: &CheckedBackup, present: &Present<'_>) -> RestorePlan {
+    pub fn plan(&self, checked: &CheckedBackup, present: &Present<'_>) -> Value {
         let staged = self.staged();
         let loaded = CalibrationPlace::at(&staged.join(CALIBRATION)).load();
         let file = loaded.ok().flatten().map(|loaded| loaded.file);
         let restored = file.and_then(|file| file.calibration().ok());
-        let misfit = restored.as_ref().and_then(|found| misfit(found, present));
+        let misfit = restored
+            .as_ref()
+            .and_then(|restored| misfit(restored, present));
+        let elsewhere =
+            "the configuration names another file, head.calibration: put it there by hand";
         let of_calibration = match (&restored, &misfit) {
-            (None, _) => Some("the backup has no calibration".into()),
-            (_, Some(words)) => Some(words.clone()),
-            (Some(_), None) => present.calibrated_elsewhere.then(|| {
-                "the configuration names another file, head.calibration: put it there by hand"
-                    .into()
-            }),
+            (None, _) => Some("the backup has no calibration"),
+            (_, Some(words)) => Some(&**words),
+            (Some(_), None) => present.calibrated_elsewhere.then_some(elsewhere),
         };
         let used = restored.as_ref().filter(|_| misfit.is_none());
         let (recipes, of_recipes) = recipes(&staged, used, present);
-        let numbers: BTreeSet<u16> = recipes.iter().map(|row| row.number).collect();
-        let mut removed = present.recipes.numbers();
-        removed.retain(|number| !numbers.contains(number));
-        let refused = |what, refused| RestoreOption { what, refused };
-        RestorePlan {
-            made_at_unix_s: checked.manifest.made_at_unix_s,
-            made_by: checked.manifest.made_by.clone(),
-            serial: checked.manifest.serial.clone(),
-            same_device: checked.manifest.serial == present.serial,
-            configuration_differs: fs::read(staged.join(CONFIGURATION))
-                .is_ok_and(|text| text != present.configuration.as_bytes()),
-            choices: [
-                refused(RestorePart::Everything, misfit),
-                refused(RestorePart::Recipes, of_recipes),
-                refused(RestorePart::Calibration, of_calibration),
+        let stored = Store::at(&staged.join(RECIPES)).numbers();
+        let gone = present.recipes.numbers().into_iter();
+        let gone = gone
+            .filter(|number| !stored.contains(number))
+            .map(|number| {
+                let name = present.recipes.present(number).map(|file| file.name);
+                json!({ "number": number, "name": name.unwrap_or_default() })
+            });
+        let present_id = present.calibration.map(Calibration::fingerprint);
+        let calibration = restored.as_ref().map(Calibration::fingerprint);
+        let calibration = calibration.map(
+            |id| json!({ "fingerprint": id, "present": compared(present_id.as_deref(), &id) }),
+        );
+        let history = checked.history.as_ref().map(|history| {
+            let now = present.history.holding().ok();
+            json!({
+                "results": history.results, "last": history.last,
+                "present_results": now.as_ref().map_or(0, |now| now.results),
+                "present_last": now.and_then(|now| now.last),
+            })
+        });
+        let users = checked.users.as_ref().map(|users| {
+            let rows = users.iter().map(|user| {
+                let known = present.users.iter().find(|now| is_same(&now.name, &user.name));
+                json!({ "name": user.name, "role": user.role, "present_role": known.map(|now| now.role) })
+            });
+            rows.collect::<Value>()
+        });
+        let configuration = fs::read(staged.join(CONFIGURATION));
+        let manifest = &checked.manifest;
+        json!({
+            "made_at_unix_s": manifest.made_at_unix_s, "made_by": manifest.made_by,
+            "serial": manifest.serial, "same_device": manifest.serial == present.serial,
+            "configuration_differs": configuration.is_ok_and(|text| text != present.configuration.as_bytes()),
+            "choices": [
+                { "what": RestorePart::Everything, "refused": misfit },
+                { "what": RestorePart::Recipes, "refused": of_recipes },
+                { "what": RestorePart::Calibration, "refused": of_calibration },
             ],
-            removed: removed
-                .into_iter()
-                .map(|number| RemovedRow {
-                    number,
-                    name: present
-                        .recipes
-                        .present(number)
-                        .map_or_else(String::new, |file| file.name),
-                })
-                .collect(),
-            calibration: restored.map(|restored| {
-                let fingerprint = restored.fingerprint();
-                let present = present.calibration.map(Calibration::fingerprint);
-                CalibrationRow {
-                    present: found(present.as_deref(), &fingerprint),
-                    fingerprint,
-                }
-            }),
-            history: checked.history.as_ref().map(|history| {
-                let now = present.history.holding().ok();
-                HistoryRow {
-                    results: history.results,
-                    last: history.last,
-                    present_results: now.as_ref().map_or(0, |now| now.results),
-                    present_last: now.and_then(|now| now.last),
-                }
-            }),
-            users: checked.users.as_ref().map(|users| {
-                let rows = users.iter().map(|user| UserRow {
-                    name: user.name.clone(),
-                    role: user.role,
-                    present_role: present
-                        .users
-                        .iter()
-                        .find(|now| now.name.to_lowercase() == user.name.to_lowercase())
-                        .map(|now| now.role),
-                });
-                rows.collect()
-            }),
-            recipes,
-            recordings: fs::read_dir(staged.join(RECORDINGS)).map_or(0, Iterator::count),
-        }
+            "recipes": recipes, "removed": gone.collect::<Value>(), "calibration": calibration,
+            "history": history, "users": users,
+            "recordings": fs::read_dir(staged.join(RECORDINGS)).map_or(0, Iterator::count),
+        })
     }
 }
 
-fn found(present: Option<&str>, fingerprint: &str) -> Likeness {
+/// How what comes back compares with what is there.
+fn compared(present: Option<&str>, fingerprint: &str) -> &'static str {
     match present {
-        None => Likeness::None,
-        Some(present) if present == fingerprint => Likeness::Same,
-        Some(_) => Likeness::Other,
+        None => "none",
+        Some(present) if present == fingerprint => "same",
+        Some(_) => "other",
     }
 }
 
@@ -215,46 +129,34 @@ fn recipes(
     staged: &Path,
     restored: Option<&Calibration>,
     present: &Present<'_>,
-) -> (Vec<RecipeRow>, Option<String>) {
+) -> (Value, Option<String>) {
     let store = Store::at(&staged.join(RECIPES));
-    let restored_id = restored.map(Calibration::fingerprint);
-    let present_id = present.calibration.map(Calibration::fingerprint);
-    let mut strange = None;
+    let [restored_id, present_id] =
+        [restored, present.calibration].map(|known| known.map(Calibration::fingerprint));
+    let mut refused = None;
     let rows = store.numbers().into_iter().map(|number| {
-        let loaded = store.load_to_edit(number);
-        let (file, problem) = match loaded {
+        let (file, problem) = match store.load_to_edit(number) {
             Err(error) => (store.present(number), Some(error.to_string())),
             Ok(loaded) => {
-                let of = |id: &Option<String>| id.as_ref() == Some(&loaded.file.calibration);
-                let planned_on = match of(&restored_id) {
-                    true => restored,
-                    false => present.calibration.or(restored),
-                };
-                if of(&restored_id) && !of(&present_id) {
-                    strange.get_or_insert(number);
+                let is_of = |id: &Option<String>| id.as_ref() == Some(&loaded.file.calibration);
+                let (comes, is_here) = (is_of(&restored_id), is_of(&present_id));
+                if comes && !is_here {
+                    refused.get_or_insert_with(|| format!(
+                        "recipe {number} was made for the backup's calibration, which this device does not have: restore everything"
+                    ));
                 }
-                let planned =
-                    planned_on.map(|calibration| Plan::try_out(loaded.recipe, calibration));
-                let problem = planned.and_then(Result::err).map(|error| error.to_string());
-                (Some(loaded.file), problem)
+                let head = restored.filter(|_| comes).or(present.calibration).or(restored);
+                let planned = head.map(|head| Plan::try_out(loaded.recipe, head));
+                let problem = planned.and_then(Result::err);
+                (Some(loaded.file), problem.map(|error| error.to_string()))
             }
         };
-        let file: Option<RecipeFile> = file;
-        let fingerprint = file
-            .as_ref()
-            .map_or_else(String::new, |file| file.fingerprint.clone());
-        let now = manifest_at(&present.recipes.path(number)).map(|file| file.fingerprint);
-        RecipeRow {
-            number,
-            name: file.map_or_else(String::new, |file| file.name),
-            present: found(now.as_deref(), &fingerprint),
-            fingerprint,
-            problem,
-        }
+        let (name, fingerprint) = file.map_or_else(Default::default, |file| (file.name, file.fingerprint));
+        let now = present.recipes.manifest(number).ok().map(|file| file.fingerprint);
+        json!({
+            "number": number, "name": name, "fingerprint": fingerprint, "problem": problem,
+            "present": compared(now.as_deref(), &fingerprint),
+        })
     });
-    let rows = rows.collect();
-    let refused = strange.map(|number| {
-        format!("recipe {number} was made for the backup's calibration, which this device does not have: restore everything")
-    });
-    (rows, refused)
+    (rows.collect(), refused)
 }

@@ -124,7 +124,7 @@ fn checked(site: &Site, archive: &std::path::Path) -> Answered<()> {
         calibrated_elsewhere: site.calibration_file.is_some(),
     };
     let plan = site.backups.plan(&checked, &present);
-    let offered = site.backups.offer(&checked, &plan);
+    let offered = site.backups.offer(&checked, plan);
     offered
         .map_err(|error| Problem::unstored(format!("store the plan: {error}: free space"), &error))
 }
