@@ -174,7 +174,7 @@ export async function access({ browser, program, step, folder }) {
       });
       assert.equal(refused.status, 403);
       assert.equal(refused.role, "technician");
-      assert.match(refused.error, /operator is operator, and this needs a technician or an engineer/);
+      assert.match(refused.error, /operator is an operator, and this needs a technician or an engineer/);
       // A password of one's own is changed.
       await view(page, "device");
       assert.equal(await page.textContent("#own-words"), "Signed in as operator (operator).");
@@ -265,7 +265,7 @@ export async function access({ browser, program, step, folder }) {
       await page.check("#plan-choices input[value=recipes]");
       assert.ok(!/results|user /.test(await page.textContent("#plan-rows")), "what is not restored is listed");
       await press(page, "#restore-order");
-      await shown(page, "#ordered", "At the next start the backup (recipes only) is put in place, by order of engineer2.");
+      await shown(page, "#ordered", "At the next start the backup (recipes only) is put in place, by order of engineer2 (engineer).");
       assert.ok(await page.locator("#plan").isHidden());
       await accessible(page, "ordered");
       await press(page, "#restore-discard");

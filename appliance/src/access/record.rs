@@ -6,6 +6,7 @@
 
 use super::backward::Backward;
 use super::role::Role;
+use super::users::ENGINEER;
 use crate::storage::folder::{rename_whole, sync_folder_of};
 use crate::storage::hex;
 use crate::storage::state::{Counter, RecordEnd};
@@ -338,7 +339,7 @@ pub fn author(line: &Value) -> String {
     match (word("user"), word("way")) {
         ("", "plc") => format!("PLC {}", word("from")),
         ("", _) => word("from").to_owned(),
-        (user, _) if user == word("role") => user.to_owned(),
+        (ENGINEER, _) => ENGINEER.to_owned(),
         (user, _) => format!("{user} ({})", word("role")),
     }
 }
