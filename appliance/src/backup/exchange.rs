@@ -259,31 +259,23 @@ impl Backups {
             let words = format!("{error}: it goes on with the next start, free space");
             Failure::because(Exit::CannotCreate, what, words)
         };
-        if !order.begun {
-            let prepared = self.prepare(state, &order, utc_s);
-            if let Err(words) = prepared {
-                if order.what == RestorePart::Undo && !self.before().exists() {
-                    rename_whole(&self.staged(), &self.before()).map_err(failed)?;
-                }
-                self.forget().map_err(failed)?;
-                return Ok(Some(format!(
-                    "the restore ({}) was not carried out, and the state is as it was: {words}",
-                    order.what.word()
-                )));
+        if !order.begun
+            && let Err(words) = self.begin(state, &mut order, record, utc_s)
+        {
+            let staged = self.staged();
+            if order.what == RestorePart::Undo && staged.exists() {
+                remove_all(&self.before()).map_err(failed)?;
+                rename_whole(&staged, &self.before()).map_err(failed)?;
             }
-            order.begun = true;
-            self.write(ORDER, &order).map_err(failed)?;
+            self.forget().map_err(failed)?;
+            return Ok(Some(format!(
+                "the restore ({}) was not carried out, and the state is as it was: {words}",
+                order.what.word()
+            )));
         }
         for item in &order.items {
             self.exchange(item).map_err(failed)?;
         }
-        let change = Change {
-            way: Way::Page,
-            from: "at the start".into(),
-            changed: Some(format!("ordered by {}", order.by)),
-            ..Change::of_command("restore", order.what.word().into())
-        };
-        record.add(&change).map_err(failed)?;
         rename_whole(&self.path(ORDER), &self.path(DONE)).map_err(failed)?;
         self.clean();
         Ok(Some(format!(
@@ -293,7 +285,34 @@ impl Backups {
         )))
     }
 
-    /// Makes room for the state before, and sees to numbers and id of the history. Repeated after a
+    /// Everything that a full storage could refuse; behind it there are only renames.
+    fn begin(
+        &self,
+        state: &StateFolder,
+        order: &mut RestoreOrder,
+        record: &ChangeRecord,
+        utc_s: Option<u64>,
+    ) -> std::result::Result<(), String> {
+        self.prepare(state, order, utc_s)?;
+        let begun = || {
+            for item in &order.items {
+                let goes = self.before().join(&item.name);
+                goes.parent().map_or(Ok(()), fs::create_dir_all)?;
+            }
+            record.add(&Change {
+                way: Way::Page,
+                from: "at the start".into(),
+                changed: Some(format!("ordered by {}", order.by)),
+                ..Change::of_command("restore", order.what.word().into())
+            })
+        };
+        let words = |error: io::Error| format!("{error}: free space, and order it again");
+        begun().map_err(words)?;
+        order.begun = true;
+        self.write(ORDER, order).map_err(words)
+    }
+
+    /// Sees to the place of the state before, and to numbers and id of the history. Repeated after a
     /// kill it changes nothing more.
     fn prepare(
         &self,
@@ -339,13 +358,10 @@ impl Backups {
             return Ok(());
         }
         if present.exists() {
-            goes.parent().map_or(Ok(()), fs::create_dir_all)?;
             fs::rename(&present, &goes)?;
             sync_folder_of(&goes)?;
         }
-        fs::create_dir_all(self.before())?;
         if item.comes {
-            present.parent().map_or(Ok(()), fs::create_dir_all)?;
             fs::rename(&comes, &present)?;
         }
         sync_folder_of(&present)

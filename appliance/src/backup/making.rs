@@ -31,7 +31,7 @@ const ATTEMPTS: usize = 5;
 const PIECE: usize = 256 << 10;
 /// After each piece there is a rest of so many times the work on it, so that a cycle beside it has the
 /// cores and the memory, but not longer than this: a slow client has made it wait already.
-const REST: u32 = 6;
+const REST: u32 = 8;
 const LONGEST_REST: Duration = Duration::from_millis(20);
 
 /// What a backup has beside recipes, calibration, history and record.

@@ -1,7 +1,7 @@
 //! Backups: one is made and sent while the station runs, one that comes is checked, and what is to come
 //! back is ordered for the next start.
 
-use super::downloads::{LARGE_CHUNK, sent_alone};
+use super::downloads::sent_alone;
 use super::gate::Changed;
 use super::orders::{Accepted, accepted};
 use super::problem::{Answered, Problem};
@@ -58,7 +58,6 @@ pub(super) async fn make(site: Site, Query(wanted): Query<BackupContents>) -> An
             Err(words) => drop(begun.send(Err(Problem::broken(words)))),
             Ok(snapshot) => {
                 if begun.send(Ok(())).is_ok() {
-                    to.most = LARGE_CHUNK;
                     // The locks are free again: from here on only idle cores work.
                     computing::stand_back();
                     let written = snapshot.write(&mut to).map_err(io::Error::other);

@@ -31,7 +31,7 @@ use crate::storage::archive::{packed, stored};
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
 /// The same of maps, which have tens of megabytes.
-pub(super) const LARGE_CHUNK: usize = 1 << 20;
+const LARGE_CHUNK: usize = 1 << 20;
 
 /// Lines of the record of changes in the diagnostic bundle.
 const MOST_CHANGES: usize = 1000;
@@ -156,7 +156,7 @@ pub(super) struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
     /// Bytes of a chunk.
-    pub(super) most: usize,
+    most: usize,
     /// Whether all of the answer was sent.
     whole: Arc<AtomicBool>,
     /// Longest wait for the client to take a chunk.
