@@ -160,6 +160,21 @@ impl Access {
         Ok((token, signed))
     }
 
+    /// Refuses a guess that has to wait, without a hash.
+    ///
+    /// # Errors
+    /// There were too many wrong guesses.
+    pub fn wait(&self, from: IpAddr, name: Option<&str>, now: Instant) -> Result<(), Refused> {
+        let (from, _, key) = guessed(from, name);
+        let logins = self.logins();
+        let of_name = key.map_or(Duration::ZERO, |key| logins.names.wait(&key, now));
+        let wait = logins.addresses.wait(&from, now).max(of_name);
+        match wait.is_zero() {
+            true => Ok(()),
+            false => Err(Refused::Wait(wait)),
+        }
+    }
+
     /// Whose password this is, waiting after wrong ones. The caller guesses alone.
     fn guess(
         &self,
@@ -168,21 +183,9 @@ impl Access {
         password: &str,
         now: Instant,
     ) -> Result<Signed, Refused> {
-        let from = network(from);
-        let name = name.filter(|name| !name.is_empty() && !users::is_same(name, ENGINEER));
-        // As long as any name may be, so that the memory of guesses is bounded.
-        let key = name.map(|name| name.to_lowercase().chars().take(users::LONGEST).collect());
-        let user = {
-            let logins = self.logins();
-            let of_name = key
-                .as_ref()
-                .map_or(Duration::ZERO, |key| logins.names.wait(key, now));
-            let wait = logins.addresses.wait(&from, now).max(of_name);
-            if !wait.is_zero() {
-                return Err(Refused::Wait(wait));
-            }
-            name.and_then(|name| logins.users.find(name).cloned())
-        };
+        self.wait(from, name, now)?;
+        let (from, name, key) = guessed(from, name);
+        let user = name.and_then(|name| self.logins().users.find(name).cloned());
         let right = match (name, &user) {
             (None, _) => secret::is_right(password, &self.0.hash),
             _ if password.len() > users::LONGEST => Ok(false),
@@ -334,6 +337,14 @@ impl Access {
     fn logins(&self) -> MutexGuard<'_, Logins> {
         self.0.logins.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Where a guess comes from, whom it names but the engineer, and how that name is remembered: as long
+/// as any name may be, so that the memory is bounded.
+fn guessed(from: IpAddr, name: Option<&str>) -> (IpAddr, Option<&str>, Option<String>) {
+    let name = name.filter(|name| !name.is_empty() && !users::is_same(name, ENGINEER));
+    let key = name.map(|name| name.to_lowercase().chars().take(users::LONGEST).collect());
+    (network(from), name, key)
 }
 
 fn engineer() -> Signed {

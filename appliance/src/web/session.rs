@@ -66,6 +66,9 @@ pub(super) async fn begin(
         time_ms,
     } = request::json(request).await?;
     let received = site.station.now();
+    // One that has to wait takes no place of others.
+    let waits = site.access.wait(from, user.as_deref(), Instant::now());
+    waits.map_err(refusal)?;
     let guess = site.change(move |site| {
         let now = Instant::now();
         Ok(site.access.sign_in(from, user.as_deref(), &secret, now))
