@@ -165,7 +165,12 @@ impl Backups {
         // Results belong to the device that has them.
         let results = all && (is_same || replaces) && checked.history.is_some();
         if results {
-            names.extend(DATABASE.into_iter().chain([RECORDINGS, STUDIES]));
+            names.extend(DATABASE.into_iter().chain([STUDIES]));
+            // Recordings are known by the numbers of their results: those of this device stay beside
+            // its older results.
+            if replaces || staged.join(RECORDINGS).exists() {
+                names.push(RECORDINGS);
+            }
         }
         if choice.users {
             names.push(USERS);

@@ -147,8 +147,7 @@ impl Backups {
             snapshot.link_all(state, USERS, &|_| true)?;
         }
         if wanted.recordings {
-            // What is being written or removed has a dot in front.
-            snapshot.link_all(state, RECORDINGS, &|name| !name.starts_with('.'))?;
+            snapshot.link_recordings(state)?;
         }
         snapshot.add(
             CONFIGURATION.into(),
@@ -227,6 +226,27 @@ impl StateSnapshot {
             }
             Ok(_) => Ok(()),
         }
+    }
+
+    /// Links each recording that is whole: what is being written or removed has a dot in front.
+    fn link_recordings(&mut self, state: &Path) -> io::Result<()> {
+        for entry in fs::read_dir(state.join(RECORDINGS))
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let name = format!("{RECORDINGS}/{}", entry.file_name().to_string_lossy());
+            if name.contains("/.") {
+                continue;
+            }
+            let before = self.members.len();
+            self.link_all(state, &name, &|_| true)?;
+            // One that was removed meanwhile may be there in part.
+            if !entry.path().exists() {
+                self.members.truncate(before);
+            }
+        }
+        Ok(())
     }
 
     /// Links the calibration with its maps and the one before. They are not written under a lock, so

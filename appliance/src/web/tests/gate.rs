@@ -3,6 +3,8 @@
 use super::*;
 use crate::access::Role;
 use crate::web::gate::Least;
+use std::rc::Rc;
+use std::time::Duration;
 
 /// A path of a route, with something in place of its parameters.
 fn path(route: &server::Route) -> String {
@@ -36,69 +38,86 @@ async fn users(served: &Served) -> Vec<(Role, String)> {
     cookies
 }
 
+/// Longest wait for an answer that is refused, and for one that is not.
+const PATIENCE: Duration = Duration::from_secs(60);
+const SOON: Duration = Duration::from_millis(200);
+
 #[tokio::test]
 async fn each_route_is_answered_for_those_who_may_and_for_nobody_else() {
-    for looking_is_open in [true, false] {
-        let served = served_to(looking_is_open).await;
-        let users = users(&served).await;
-        let mut cases: Vec<(Option<Role>, String)> = vec![(None, String::new())];
-        cases.extend(
-            users
-                .iter()
-                .map(|(role, cookie)| (Some(*role), cookie.clone())),
-        );
-        // A session whose user has just lost its role, or is gone.
-        let lost = |name: &'static str| {
-            let body = format!("{{\"user\": \"{name}\", \"secret\": \"correct horse\"}}");
-            let access = served.site.access.clone();
-            let by = (None, "a test");
-            access
-                .set_user(name, Role::Engineer, Some("correct horse"), by)
-                .unwrap();
-            body
-        };
-        let demoted = served.sign_in_with(&lost("demoted")).await;
-        let removed = served.sign_in_with(&lost("removed")).await;
-        let access = &served.site.access;
+    let tasks = tokio::task::LocalSet::new();
+    tasks.run_until(async { each_route(true).await }).await;
+    tasks.run_until(async { each_route(false).await }).await;
+}
+
+async fn each_route(looking_is_open: bool) {
+    let served = Rc::new(served_to(looking_is_open).await);
+    let users = users(&served).await;
+    let mut cases: Vec<(Option<Role>, String)> = vec![(None, String::new())];
+    cases.extend(
+        users
+            .iter()
+            .map(|(role, cookie)| (Some(*role), cookie.clone())),
+    );
+    // A session whose user has just lost its role, or is gone.
+    let lost = |name: &'static str| {
+        let body = format!("{{\"user\": \"{name}\", \"secret\": \"correct horse\"}}");
+        let access = served.site.access.clone();
+        let by = (None, "a test");
         access
-            .set_user("demoted", Role::Operator, None, (None, "a test"))
+            .set_user(name, Role::Engineer, Some("correct horse"), by)
             .unwrap();
-        access.remove_user("removed").unwrap();
-        cases.extend([(Some(Role::Operator), demoted), (None, removed)]);
-        for route in rows() {
-            let path = path(&route);
-            for (role, cookie) in &cases {
-                let least = match route.least {
-                    Least::Anyone => None,
-                    Least::Collector => Some(Role::Viewer),
-                    Least::User(least) => Some(least),
-                };
-                let open = looking_is_open && least <= Some(Role::Viewer);
-                let wanted = match (least, role) {
-                    _ if open => None,
-                    (None, _) => None,
-                    (Some(_), None) => Some(401),
-                    (Some(least), Some(role)) => (*role < least).then_some(403),
-                };
-                let method = route.method.as_str();
-                let answer = served.change(method, &path, cookie, "{").await;
-                match wanted {
-                    // What the role may is answered in whatever other way.
-                    None => assert!(
-                        ![401, 403].contains(&answer.status),
-                        "{role:?} {method} {path}: {answer:?}"
-                    ),
-                    Some(status) => {
-                        assert_eq!(answer.status, status, "{role:?} {method} {path}");
-                        let words = least.map(Role::or_more).unwrap_or_default();
-                        let said = answer.body.contains("sign in") || answer.body.contains(&words);
-                        assert!(said, "{answer:?}");
-                    }
+        body
+    };
+    let demoted = served.sign_in_with(&lost("demoted")).await;
+    let removed = served.sign_in_with(&lost("removed")).await;
+    let access = &served.site.access;
+    access
+        .set_user("demoted", Role::Operator, None, (None, "a test"))
+        .unwrap();
+    access.remove_user("removed").unwrap();
+    cases.extend([(Some(Role::Operator), demoted), (None, removed)]);
+    for route in rows() {
+        let path = path(&route);
+        let least = match route.least {
+            Least::Anyone => None,
+            Least::Collector => Some(Role::Viewer),
+            Least::User(least) => Some(least),
+        };
+        let open = looking_is_open && least <= Some(Role::Viewer);
+        let mut asking = tokio::task::JoinSet::new();
+        for (role, cookie) in cases.clone() {
+            let wanted = match (least, role) {
+                _ if open => None,
+                (None, _) => None,
+                (Some(_), None) => Some(401),
+                (Some(least), Some(role)) => (role < least).then_some(403),
+            };
+            let (served, method, path) = (served.clone(), route.method.clone(), path.clone());
+            asking.spawn_local(async move {
+                let asked = served.change(method.as_str(), &path, &cookie, "{");
+                // A refusal comes at once; others may wait for a measuring task, which is silent here.
+                let patience = wanted.map_or(SOON, |_| PATIENCE);
+                let answer = tokio::time::timeout(patience, asked).await;
+                (role, wanted, answer.ok())
+            });
+        }
+        while let Some(answered) = asking.join_next().await {
+            let (role, wanted, answer) = answered.unwrap();
+            let case = format!("{role:?} {} {path}: {answer:?}", route.method);
+            let status = answer.as_ref().map(|answer| answer.status);
+            match wanted {
+                // What the role may is answered in whatever other way.
+                None => assert!(![Some(401), Some(403)].contains(&status), "{case}"),
+                Some(wanted) => {
+                    assert_eq!(status, Some(wanted), "{case}");
+                    let words = least.map(Role::or_more).unwrap_or_default();
+                    let body = answer.unwrap().body;
+                    assert!(body.contains("sign in") || body.contains(&words), "{case}");
                 }
             }
         }
-        assert_eq!(served.handle.snapshot().triggers, 0);
     }
+    assert_eq!(served.handle.snapshot().triggers, 0);
 }
 
 #[test]
@@ -214,7 +233,7 @@ async fn a_request_whose_sender_loses_the_role_while_its_body_comes_changes_noth
         &body[..10]
     );
     stream.write_all(head.as_bytes()).await.unwrap();
-    tokio::time::sleep(std::time::Duration::from_millis(300)).await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
     let access = &served.site.access;
     access
         .set_user("a-engineer", Role::Technician, None, (None, "a test"))
