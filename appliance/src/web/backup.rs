@@ -31,18 +31,19 @@ impl From<OrderError> for Problem {
     }
 }
 
+/// Longest wait for the end of a backup that another client has received already.
+const TURN: Duration = Duration::from_secs(10);
+
 /// One backup is made or checked at a time.
-fn one(site: &Site) -> Answered<OwnedMutexGuard<()>> {
+async fn one(site: &Site) -> Answered<OwnedMutexGuard<()>> {
     let busy = "another backup is being made or checked: wait until that is done";
-    site.carrying
-        .clone()
-        .try_lock_owned()
-        .map_err(|_| Problem::busy(busy))
+    let turn = tokio::time::timeout(TURN, site.carrying.clone().lock_owned()).await;
+    turn.map_err(|_| Problem::busy(busy))
 }
 
 /// Makes a backup and sends it piece by piece.
 pub(super) async fn make(site: Site, Query(wanted): Query<BackupContents>) -> Answered<Response> {
-    let turn = one(&site)?;
+    let turn = one(&site).await?;
     let serial = site.station.snapshot().identity.serial.clone();
     let name = format!("attachment; filename=\"fringed-{serial}-backup.zip\"");
     let failed = "making the backup failed; see the log";
@@ -85,7 +86,7 @@ fn shown(site: &Site) -> Value {
 
 /// Receives a backup, checks it, and answers with what it would bring back.
 pub(super) async fn check(site: Site, request: Request) -> Answered<Json<Value>> {
-    let turn = one(&site)?;
+    let turn = one(&site).await?;
     if !shown(&site)["ordered"].is_null() {
         let words = "a restore is ordered: discard it first, or start the device again";
         return Err(Problem::busy(words));
@@ -134,7 +135,7 @@ async fn ordered(
     words: String,
     act: impl FnOnce(&Site) -> Answered<()> + Send + 'static,
 ) -> Answered<(Extension<Changed>, Json<Value>)> {
-    let turn = one(&site)?;
+    let turn = one(&site).await?;
     let after = site.change(move |site| {
         let _turn = turn;
         act(site)?;
