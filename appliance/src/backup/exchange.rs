@@ -10,7 +10,9 @@
 //! record of changes, which says who ordered the restore.
 
 use super::checking::CheckedBackup;
-use super::{Backups, DATABASE, OF_HEAD, RECIPES, RECORDINGS, RestorePart, STUDIES, USERS};
+use super::{
+    Backups, CALIBRATION, DATABASE, OF_HEAD, RECIPES, RECORDINGS, RestorePart, STUDIES, USERS,
+};
 use crate::access::{Change, ChangeRecord, Way};
 use crate::error::{Exit, Failure, Result};
 use crate::history::carry;
@@ -156,7 +158,8 @@ impl Backups {
             return Err(OrderError::Refused(words.into()));
         }
         let mut names = Vec::new();
-        if choice.what != RestorePart::Recipes {
+        // A backup that was made before the head was calibrated takes no calibration away.
+        if choice.what != RestorePart::Recipes && staged.join(CALIBRATION).exists() {
             names.extend(OF_HEAD);
         }
         if choice.what != RestorePart::Calibration {

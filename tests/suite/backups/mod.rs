@@ -347,3 +347,49 @@ fn another_device_takes_recipes_but_no_results_unless_it_replaces_the_first_and_
     let (status, answer) = browser.json("DELETE", "/api/restore", &json!({}));
     assert_eq!((status, &answer["checked"]), (200, &Value::Null));
 }
+
+#[test]
+fn a_calibration_comes_back_alone_and_is_refused_on_another_head_by_name() {
+    let calibrated = |size: u32| {
+        let place = place_before(&format!("[rig.camera]\nwidth = {size}\nheight = {size}\n"));
+        let (config, state) = (place.path("fringed.toml"), place.path("state"));
+        let [config, state] = [&config, &state].map(|path| path.to_str().unwrap());
+        let arguments = ["calibrate", "--config", config, "--state", state];
+        program().run(&arguments).succeeded();
+        place
+    };
+    let first = calibrated(160);
+    let (daemon, mut browser) = started(&first);
+    let seq = browser.measure()["seq"].as_u64().unwrap();
+    recording(&first, seq as u32);
+    let zip = backup(&mut browser, "");
+    let other = calibrated(200);
+    let (_daemon, mut elsewhere) = started(&other);
+    let (status, _) = elsewhere.ask("POST", "/api/restore", &zip);
+    assert_eq!(status, 200);
+    for what in ["calibration", "everything"] {
+        let (status, answer) = elsewhere.json("PUT", "/api/restore", &json!({ "what": what }));
+        let words = answer["error"].as_str().unwrap();
+        assert!(
+            status == 422 && words.contains("of another head: it is for a camera of 160×160"),
+            "{answer}"
+        );
+    }
+    let fingerprint = |place: &Place| -> Value {
+        let text = fs::read(place.path("state/calibration/calibration.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["fingerprint"].clone()
+    };
+    let before = fingerprint(&first);
+    ordered(&mut browser, &zip, &json!({ "what": "calibration" }));
+    assert!(daemon.terminate().success());
+    let (daemon, mut browser) = started(&first);
+    assert_eq!(fingerprint(&first), before);
+    assert_eq!(browser.get("/api/restore")["before"]["what"], "calibration");
+    // A backup without recordings leaves those of this device beside its results.
+    ordered(&mut browser, &zip, &json!({ "what": "everything" }));
+    assert!(daemon.terminate().success());
+    let (_daemon, mut browser) = started(&first);
+    assert_eq!(browser.measure()["verdict"], "PASS");
+    let kept = browser.get(&format!("/api/history/{seq}"));
+    assert!(kept["result"]["recording"].is_string(), "{kept}");
+}
