@@ -12,6 +12,9 @@ const USERS = { operator: ["operator", "482915"], technician: ["technician", "a 
 // Presses of Tab that reach anything on a view.
 const TABS = 300;
 
+// Each screen and each colour scheme once.
+const LOOKS = [["desktop", "light"], ["phone", "dark"]];
+
 export async function access({ browser, program, step, folder }) {
   const place = new Place();
   const daemon = await Daemon.start(program, place);
@@ -77,15 +80,13 @@ export async function access({ browser, program, step, folder }) {
   // Nothing is wrong with the view that is open, on both screens, light and dark.
   async function accessible(page, what) {
     await page.evaluate(AXE);
-    for (const colorScheme of ["light", "dark"]) {
-      for (const name of Object.keys(SIZES)) {
-        await page.emulateMedia({ colorScheme });
-        await page.setViewportSize(SIZES[name]);
-        const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"] }));
-        assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes[0].html]), [], `${what}, ${name}, ${colorScheme}`);
-        assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth), `${what}, ${name}: wider than the screen`);
-        if (folder) await page.screenshot({ path: join(folder, `access-${what}-${name}-${colorScheme}.png`), fullPage: true });
-      }
+    for (const [name, colorScheme] of LOOKS) {
+      await page.emulateMedia({ colorScheme });
+      await page.setViewportSize(SIZES[name]);
+      const { violations } = await page.evaluate(() => window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"] }));
+      assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes[0].html]), [], `${what}, ${name}, ${colorScheme}`);
+      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth), `${what}, ${name}: wider than the screen`);
+      if (folder) await page.screenshot({ path: join(folder, `access-${what}-${name}-${colorScheme}.png`), fullPage: true });
     }
     await page.setViewportSize(SIZES.desktop);
     await page.emulateMedia({ colorScheme: "light" });
