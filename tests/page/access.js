@@ -187,18 +187,20 @@ export async function access({ browser, program, step, folder }) {
       await (await as("operator")).context().close();
     });
 
-    await step("a technician teaches and edits, and each version says by whom", async () => {
+    await step("a technician teaches and edits by keyboard, and each version says by whom", async () => {
       const page = await as("technician");
       await view(page, "recipes");
       await page.waitForFunction(() => document.querySelector("#teach-as").value === "2");
-      await page.click("#teach button");
+      await press(page, "#teach button");
       await page.waitForSelector("#teaching:not([hidden])");
       await shown(page, "#notice", "recipe 2 is taught and active");
       await ready(page);
-      await page.click("[aria-label='Edit recipe 2']");
+      await press(page, "[aria-label='Edit recipe 2']");
       await page.waitForFunction(() => /^Tried on golden/.test(document.querySelector("#editor-state").textContent));
-      await page.fill("#editor-name", "by the technician");
-      await page.click("#editor-form button[type=submit]");
+      await reach(page, "#editor-name");
+      await page.keyboard.press("Control+A");
+      await page.keyboard.type("by the technician");
+      await press(page, "#editor-form button[type=submit]");
       await shown(page, "#notice", "recipe 2 is stored");
       await shown(page, "#recipe-rows", "by the technician");
       await ready(page);
