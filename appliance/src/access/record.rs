@@ -7,6 +7,7 @@
 use super::backward::Backward;
 use super::role::Role;
 use super::users::ENGINEER;
+use crate::station::Snapshot;
 use crate::storage::folder::{rename_whole, sync_folder_of};
 use crate::storage::hex;
 use crate::storage::state::{Counter, RecordEnd};
@@ -16,6 +17,7 @@ use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 /// The file in the folder `access`, and the one before it.
@@ -65,6 +67,22 @@ pub struct Change {
 }
 
 impl Change {
+    /// A change that came to the station by this way from an address, now.
+    pub fn of_station(
+        snapshot: &Snapshot,
+        (way, from): (Way, IpAddr),
+        action: &str,
+        subject: String,
+    ) -> Self {
+        Self {
+            uptime_s: Some(snapshot.uptime_s),
+            boot_id: Some(format!("{:08x}", snapshot.boot_id)),
+            way,
+            from: from.to_string(),
+            ..Self::of_command(action, subject)
+        }
+    }
+
     /// A change by the command line: the user of the system that runs it, now.
     pub fn of_command(action: &str, subject: String) -> Self {
         Self {

@@ -15,9 +15,8 @@ use super::{
 };
 use crate::access::{Change, ChangeRecord, Way};
 use crate::error::{Exit, Failure, Result};
-use crate::history::carry;
-use crate::history::is_after;
-use crate::storage::folder::{read_whole, rename_whole, sync_folder_of, write_whole};
+use crate::history::{Reader, carry, is_after};
+use crate::storage::folder::{read_whole, remove, rename_whole, sync_folder_of, write_whole};
 use crate::storage::state::{Counted, SERIAL, StateFolder, random};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -240,7 +239,7 @@ impl Backups {
     pub fn forget(&self) -> io::Result<()> {
         // The order first: without it nothing of the rest is used.
         for name in [ORDER, CHECKED] {
-            crate::storage::folder::remove(&self.path(name))?;
+            remove(&self.path(name))?;
         }
         remove_all(&self.staged())
     }
@@ -341,7 +340,7 @@ impl Backups {
             return Ok(());
         };
         let (present, last) = carry::drain(state).map_err(|error| error.to_string())?;
-        let holding = crate::history::Reader::of(&staged).holding();
+        let holding = Reader::of(&staged).holding();
         let holding = holding.map_err(|error| error.to_string())?;
         let present_last = present.and_then(|present| present.last);
         let lost =

@@ -63,9 +63,7 @@ impl Reader {
                 });
             }
         }
-        // One file alone, without a log beside it.
-        let alone = copy.pragma_update_and_check(None, "journal_mode", "delete", |_| Ok(()));
-        alone.map_err(failed)
+        in_one_file(&copy).map_err(failed)
     }
 
     /// What the history holds.
@@ -75,6 +73,11 @@ impl Reader {
     pub fn holding(&self) -> HistoryResult<Holding> {
         self.read(holding)
     }
+}
+
+/// Leaves the database in one file, without a log beside it.
+fn in_one_file(connection: &Connection) -> rusqlite::Result<()> {
+    connection.pragma_update_and_check(None, "journal_mode", "delete", |_| Ok(()))
 }
 
 fn holding(connection: &Connection) -> rusqlite::Result<Holding> {
@@ -149,8 +152,7 @@ pub fn renew(path: &Path, id: &str) -> HistoryResult<()> {
         transaction.commit()
     });
     renewed.map_err(failed)?;
-    let alone = connection.pragma_update_and_check(None, "journal_mode", "delete", |_| Ok(()));
-    alone.map_err(failed)
+    in_one_file(&connection).map_err(failed)
 }
 
 /// Stores what the run before has shown and the database lacks, before another history takes its

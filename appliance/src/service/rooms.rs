@@ -89,13 +89,7 @@ impl Rooms<'_> {
                         ("load recipe", format!("part number {part}"))
                     }
                 };
-                let change = Change {
-                    uptime_s: Some(snapshot.uptime_s),
-                    boot_id: Some(format!("{:08x}", snapshot.boot_id)),
-                    way: Way::Plc,
-                    from: from.to_string(),
-                    ..Change::of_command(action, subject)
-                };
+                let change = Change::of_station(&snapshot, (Way::Plc, from), action, subject);
                 if let Err(error) = record.add(&change) {
                     progress.warn(&format!("record an order of the PLC: {error}: free space"));
                 }

@@ -131,18 +131,14 @@ fn millis(time: Duration) -> u64 {
 
 /// Whether the signal has arrived; the default value never gets one. Cheap to clone.
 #[derive(Clone, Debug, Default)]
-pub struct StopSignal(
-    Option<watch::Receiver<bool>>,
-    Option<Arc<watch::Sender<bool>>>,
-);
+pub struct StopSignal(Option<Arc<watch::Sender<bool>>>);
 
 impl Caller {
     /// Ends the program as the stop signal does, where a service manager starts it anew.
     pub fn restart(&self) -> Option<Box<dyn Fn() + Send + Sync>> {
-        let stop = self.stop.1.clone().filter(|_| self.notify.is_connected())?;
-        // All receivers are gone only where the program ends anyway.
+        let stop = self.stop.0.clone().filter(|_| self.notify.is_connected())?;
         Some(Box::new(move || {
-            let _ = stop.send(true);
+            stop.send_replace(true);
         }))
     }
 }
@@ -161,8 +157,7 @@ impl StopSignal {
         };
         let mut interrupt = listen(SignalKind::interrupt())?;
         let mut terminate = listen(SignalKind::terminate())?;
-        let (arrive, arrived) = watch::channel(false);
-        let arrive = Arc::new(arrive);
+        let arrive = Arc::new(watch::Sender::new(false));
         let signalled = arrive.clone();
         let wait = move || {
             runtime.block_on(async {
@@ -171,14 +166,13 @@ impl StopSignal {
                     _ = terminate.recv() => {}
                 }
             });
-            // All receivers are gone only where the program ends anyway.
-            let _ = signalled.send(true);
+            signalled.send_replace(true);
         };
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(wait)
             .map_err(&failed)?;
-        Ok(Self(Some(arrived), Some(arrive)))
+        Ok(Self(Some(arrive)))
     }
 
     /// Whether it has arrived.
@@ -188,8 +182,12 @@ impl StopSignal {
 
     /// Waits until it arrives.
     pub async fn wait(&self) {
-        if let Some(mut arrived) = self.0.clone()
-            && arrived.wait_for(|arrived| *arrived).await.is_ok()
+        if let Some(arrive) = &self.0
+            && arrive
+                .subscribe()
+                .wait_for(|arrived| *arrived)
+                .await
+                .is_ok()
         {
             return;
         }

@@ -141,11 +141,7 @@ async fn ordered(
         act(site)?;
         Ok(shown(site))
     });
-    let changed = Changed {
-        words,
-        recipe: None,
-    };
-    Ok((Extension(changed), Json(after.await?)))
+    Ok((Extension(words.into()), Json(after.await?)))
 }
 
 pub(super) async fn order(

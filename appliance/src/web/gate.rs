@@ -9,7 +9,6 @@ use super::problem::{Answered, Problem, ProblemWords};
 use super::site::Site;
 use crate::access::record::recipe_of;
 use crate::access::{Access, Change, Role, Signed, Way};
-use crate::system::clock;
 use crate::system::journal::{self, Severity};
 use crate::system::socket::holds;
 use axum::Extension;
@@ -65,6 +64,15 @@ pub struct Changed {
     pub words: String,
     /// The recipe, and the fingerprint of the version that came of it.
     pub recipe: Option<(u16, String)>,
+}
+
+impl From<String> for Changed {
+    fn from(words: String) -> Self {
+        Self {
+            words,
+            recipe: None,
+        }
+    }
 }
 
 /// What a request with a body may do once its body has come: an extension of the request.
@@ -280,22 +288,16 @@ pub(super) async fn record(
     let words = changed.as_ref().map(|changed| changed.words.clone());
     let made = changed.and_then(|changed| changed.recipe);
     let change = Change {
-        utc_us: clock::utc_us(),
-        uptime_s: Some(snapshot.uptime_s),
-        boot_id: Some(format!("{:08x}", snapshot.boot_id)),
-        way: Way::Page,
-        from: from.to_string(),
         user,
         role,
-        action: action.into(),
+        outcome: refused.map_or_else(|| "done".into(), |ProblemWords(words)| words),
+        changed: words.filter(|words| !words.is_empty()),
         recipe: made
             .as_ref()
             .map(|made| made.0)
             .or_else(|| recipe_of(&subject)),
-        subject,
-        outcome: refused.map_or_else(|| "done".into(), |ProblemWords(words)| words),
-        changed: words.filter(|words| !words.is_empty()),
         fingerprint: made.map(|made| made.1),
+        ..Change::of_station(&snapshot, (Way::Page, from), action, subject)
     };
     let stored =
         site.change(move |site| site.access.record().add(&change).map_err(Problem::broken));

@@ -206,11 +206,8 @@ pub(super) async fn undo(
         Some(before) => file.differences(&before),
         None => "brought back".into(),
     };
-    let changed = Changed {
-        words: format!("fingerprint {:.8}: {changed}", file.fingerprint),
-        // The version was made by whom the record names for it.
-        recipe: None,
-    };
+    // The version was made by whom the record names for it.
+    let changed = Changed::from(format!("fingerprint {:.8}: {changed}", file.fingerprint));
     let answer = json!({
         "number": number, "name": file.name, "fingerprint": file.fingerprint, "active": active, "loading": loading,
     });

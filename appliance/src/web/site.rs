@@ -60,7 +60,7 @@ pub(super) type LastOpened = Option<(EditedRecipe, Instant)>;
 pub struct Parts {
     /// The station.
     pub station: StationHandle,
-    /// The secret, the sessions and the record of changes.
+    /// Users, sessions and the record of changes.
     pub access: Access,
     /// The station's recipes.
     pub recipes: Store,

@@ -5,7 +5,7 @@ use super::problem::Answered;
 use super::request::{self, Path};
 use super::site::Site;
 use crate::access::users::MOST_USERS;
-use crate::access::{ENGINEER, Role, Signed};
+use crate::access::{ENGINEER, Role, Signed, User};
 use crate::system::clock;
 use axum::Extension;
 use axum::extract::Request;
@@ -27,12 +27,14 @@ pub(super) async fn list(site: Site) -> Json<Value> {
         "name": ENGINEER, "role": Role::Engineer, "fixed": true, "pin": false,
         "since_utc_us": null, "by": null,
     })];
-    rows.extend(site.access.users().into_iter().map(|user| {
-        let mut row = json!(user);
-        row["fixed"] = false.into();
-        row
-    }));
+    rows.extend(site.access.users().iter().map(row));
     Json(json!({ "most": MOST_USERS, "users": rows }))
+}
+
+fn row(user: &User) -> Value {
+    let mut row = json!(user);
+    row["fixed"] = false.into();
+    row
 }
 
 pub(super) async fn set(
@@ -49,14 +51,8 @@ pub(super) async fn set(
             .set_user(&name, role, secret.as_deref(), since)?)
     });
     let user = set.await?;
-    let words = format!("{} is {}", user.name, user.role.with_article());
-    let changed = Changed {
-        words,
-        recipe: None,
-    };
-    let mut row = json!(user);
-    row["fixed"] = false.into();
-    Ok((Extension(changed), Json(row)))
+    let changed = format!("{} is {}", user.name, user.role.with_article());
+    Ok((Extension(changed.into()), Json(row(&user))))
 }
 
 pub(super) async fn remove(site: Site, Path(name): Path<String>) -> Answered<Json<Value>> {
