@@ -1,6 +1,6 @@
 //! A start that restores is killed at each of its steps.
 
-use super::{backup, collected, ordered, place, seqs, started};
+use super::{backup, collected, measured, ordered, place, seqs, started};
 use crate::page::Browser;
 use crate::station_plc::command;
 use serde_json::{Value, json};
@@ -58,7 +58,7 @@ fn killed_at_each(calls: &[&str]) {
     }
     let place = place();
     let (daemon, mut browser) = started(&place);
-    browser.measure();
+    measured(&mut browser);
     let zip = backup(&mut browser, "?users=true&recordings=true");
     let body = json!({ "role": "operator", "secret": "135790" });
     assert_eq!(browser.json("PUT", "/api/users/anna", &body).0, 200);
@@ -66,7 +66,7 @@ fn killed_at_each(calls: &[&str]) {
     let edit = json!({ "fingerprint": fingerprint, "name": "later" });
     assert_eq!(browser.json("PUT", "/api/recipes/1", &edit).0, 200);
     browser.ready();
-    browser.measure();
+    measured(&mut browser);
     let old = whole(&mut browser);
     let mut daemon = Some(daemon);
     let mut steps = 0;

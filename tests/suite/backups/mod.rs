@@ -15,6 +15,7 @@ use std::fs::{self, File};
 use std::time::{Duration, Instant};
 use tests::files;
 use tests::small_head::tiny_head;
+use tests::until::{PATIENCE, until};
 
 /// Of every part the frames are kept.
 const KEEP_ALL: &str = "[history]\ngood_every = 1\n";
@@ -64,6 +65,16 @@ fn checked(zip: &[u8]) -> (tempfile::TempDir, Result<CheckedBackup, String>) {
     fs::write(&file, zip).unwrap();
     let checked = check(File::open(&file).unwrap(), &folder.path().join("into"));
     (folder, checked)
+}
+
+/// Measures a part, and waits until its result is in the history; its SEQ.
+fn measured(browser: &mut Browser) -> u64 {
+    let seq = browser.measure()["seq"].as_u64().unwrap();
+    until("stored result", PATIENCE, || {
+        let (_, results) = collected(browser, seq as u32 - 1);
+        results.first().cloned().ok_or(())
+    });
+    seq
 }
 
 /// Sends a backup and orders a choice of it; the plan.
@@ -193,7 +204,7 @@ fn a_restored_device_judges_twelve_parts_bit_by_bit_and_a_collector_loses_and_do
     let place = place();
     let (daemon, mut browser) = started(&place);
     for _ in 0..12 {
-        let seq = browser.measure()["seq"].as_u64().unwrap();
+        let seq = measured(&mut browser);
         // The frames of a part that comes while others are written are not kept.
         recording(&place, seq as u32);
     }
@@ -224,9 +235,9 @@ fn a_restored_device_judges_twelve_parts_bit_by_bit_and_a_collector_loses_and_do
     let edit = json!({ "fingerprint": before, "name": "another" });
     assert_eq!(browser.json("PUT", "/api/recipes/1", &edit).0, 200);
     browser.ready();
-    browser.measure();
+    measured(&mut browser);
     collect(&mut browser);
-    let later = browser.measure()["seq"].as_u64().unwrap();
+    let later = measured(&mut browser);
     let plan = ordered(&mut browser, &zip, &json!({ "what": "everything" }));
     assert_eq!(
         (&plan["same_device"], &plan["recipes"][0]["present"]),
@@ -241,7 +252,7 @@ fn a_restored_device_judges_twelve_parts_bit_by_bit_and_a_collector_loses_and_do
         serial
     );
     assert_eq!(browser.get("/api/recipes/1")["fingerprint"], before);
-    let next = browser.measure()["seq"].as_u64().unwrap();
+    let next = measured(&mut browser);
     assert!(next > later, "{next} {later}");
     collect(&mut browser);
     // The frames that came back are judged as they were, to the bit.
@@ -273,7 +284,7 @@ fn a_restored_device_judges_twelve_parts_bit_by_bit_and_a_collector_loses_and_do
     assert!(daemon.terminate().success());
     let (_daemon, mut browser) = started(&place);
     assert_eq!(browser.get("/api/recipes/1")["name"], "another");
-    let last = browser.measure()["seq"].as_u64().unwrap();
+    let last = measured(&mut browser);
     assert!(last > next);
     let rows = collect(&mut browser);
     let all: Vec<u64> = rows.values().flatten().copied().collect();
@@ -288,7 +299,7 @@ fn another_device_takes_recipes_but_no_results_unless_it_replaces_the_first_and_
  {
     let first = place();
     let (_daemon, mut browser) = started(&first);
-    browser.measure();
+    measured(&mut browser);
     let fingerprint = browser.get("/api/recipes/1")["fingerprint"].clone();
     let body = json!({ "role": "operator", "secret": "135790" });
     assert_eq!(browser.json("PUT", "/api/users/anna", &body).0, 200);
@@ -313,7 +324,7 @@ fn another_device_takes_recipes_but_no_results_unless_it_replaces_the_first_and_
         assert_eq!(browser.get("/api/recipes/1")["fingerprint"], fingerprint);
         let users = browser.get("/api/users");
         assert_eq!(users["users"][1]["name"], "anna");
-        let next = browser.measure()["seq"].as_u64().unwrap();
+        let next = measured(&mut browser);
         let (header, results) = collected(&mut browser, 0);
         match replaces {
             true => {
@@ -360,7 +371,7 @@ fn a_calibration_comes_back_alone_and_is_refused_on_another_head_by_name() {
     };
     let first = calibrated(160);
     let (daemon, mut browser) = started(&first);
-    let seq = browser.measure()["seq"].as_u64().unwrap();
+    let seq = measured(&mut browser);
     recording(&first, seq as u32);
     let zip = backup(&mut browser, "");
     let other = calibrated(200);
