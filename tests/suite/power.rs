@@ -48,13 +48,14 @@ struct Run {
     told: Vec<(u64, Told)>,
 }
 
-fn now() -> u64 {
+/// µs since 1970.
+pub(crate) fn now() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
     u64::try_from(since.as_micros()).unwrap()
 }
 
 /// Whether programs can be traced here; prints a message if not.
-fn can_trace() -> bool {
+pub(crate) fn can_trace() -> bool {
     let tried = Command::new("strace")
         .args(["-o", "/dev/null", "true"])
         .output();
@@ -65,19 +66,24 @@ fn can_trace() -> bool {
     can
 }
 
-impl Run {
-    fn log(&self, number: usize) -> PathBuf {
-        self.place.path(&format!("trace-{number}"))
-    }
+/// A command under strace.
+pub(crate) fn traced(log: &Path, plain: &Command) -> Command {
+    let mut traced = Command::new("strace");
+    traced.args(OPTIONS).arg("-o").arg(log);
+    traced.arg(plain.get_program()).args(plain.get_args());
+    traced.stdin(std::process::Stdio::null());
+    traced.stdout(std::process::Stdio::null());
+    traced
+}
 
+impl Run {
     /// A command under strace.
     fn traced(&self, number: usize, plain: &Command) -> Command {
-        let mut traced = Command::new("strace");
-        traced.args(OPTIONS).arg("-o").arg(self.log(number));
-        traced.arg(plain.get_program()).args(plain.get_args());
-        traced.stdin(std::process::Stdio::null());
-        traced.stdout(std::process::Stdio::null());
-        traced
+        traced(&self.log(number), plain)
+    }
+
+    fn log(&self, number: usize) -> PathBuf {
+        self.place.path(&format!("trace-{number}"))
     }
 
     /// Runs a command that changes recipes.
@@ -156,7 +162,7 @@ impl Run {
         daemon.kill();
         let root = run.place.path("");
         for log in 0..=5 {
-            let log = whole(&run.log(log));
+            let log = whole_log(&run.log(log));
             run.operations.extend(operations(&log, &root));
         }
         run
@@ -164,7 +170,7 @@ impl Run {
 }
 
 /// Reads a log to its end, which the tracer writes after the end of the program.
-fn whole(path: &Path) -> String {
+pub(crate) fn whole_log(path: &Path) -> String {
     until("end of the trace", PATIENCE, || {
         let log = fs::read_to_string(path).unwrap_or_default();
         let mut lines = log.lines();
@@ -321,7 +327,7 @@ impl Promise {
 }
 
 /// Removes the shared memory of a station, as a loss of power does.
-fn forget(serial: &str) {
+pub(crate) fn forget(serial: &str) {
     for name in files::names(Path::new("/dev/shm")) {
         if name.starts_with("fringed-") && name.contains(serial) {
             let _ = fs::remove_file(Path::new("/dev/shm").join(name));

@@ -306,6 +306,8 @@ impl Backups {
                 let goes = self.before().join(&item.name);
                 goes.parent().map_or(Ok(()), fs::create_dir_all)?;
             }
+            // A start that goes on after a loss of power finds them.
+            rustix::fs::syncfs(fs::File::open(self.folder())?)?;
             record.add(&Change {
                 way: Way::Page,
                 from: "at the start".into(),

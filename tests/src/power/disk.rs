@@ -1,13 +1,14 @@
 //! A model of a file system that loses power.
 //!
 //! Changes that have not been synced may be lost: of a file any of its writes, sector by sector; of
-//! a folder its latest changes of names, in their order. Syncing a file also keeps its own name and
+//! a folder its latest changes of names, in their order; a rename from one folder into another happens
+//! in both or in neither. Syncing a file also keeps its own name and
 //! those of the folders above it, as the journals of ext4, XFS and btrfs do, but no other files.
 //! Mapped shared memory is never on the medium.
 
 use super::{Operation, What};
 use crate::random::Random;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
@@ -21,6 +22,8 @@ type Names = BTreeMap<String, usize>;
 pub struct Disk {
     /// The first node is the root folder, which always exists.
     nodes: Vec<Node>,
+    /// The number of operations so far.
+    operations: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -50,10 +53,18 @@ type Naming = (String, Option<usize>);
 #[derive(Clone, Debug, Default)]
 struct Folder {
     certain: Names,
-    /// Since the last sync: names that were given to a node or removed; those of one operation
-    /// happen together or not at all.
-    since: Vec<(u64, Vec<Naming>)>,
+    /// Since the last sync.
+    since: Vec<Renaming>,
     now: Names,
+}
+
+/// The names that one operation gave to a node or removed in a folder: they happen together, also with
+/// those in another folder, or not at all.
+#[derive(Clone, Debug)]
+struct Renaming {
+    operation: usize,
+    done: u64,
+    names: Vec<Naming>,
 }
 
 /// How much of the uncertain changes a loss of power leaves.
@@ -71,17 +82,56 @@ impl Default for Disk {
     fn default() -> Self {
         Self {
             nodes: vec![Node::Folder(Folder::default())],
+            operations: 0,
         }
     }
 }
 
 impl Disk {
+    /// A copy of a folder; all that is in it is certainly on the medium.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn holding(folder: &Path) -> io::Result<Self> {
+        let mut disk = Self::default();
+        disk.hold(0, folder)?;
+        Ok(disk)
+    }
+
+    fn hold(&mut self, at: usize, folder: &Path) -> io::Result<()> {
+        let mut names = Names::new();
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let node = self.nodes.len();
+            if entry.file_type()?.is_dir() {
+                self.nodes.push(Node::Folder(Folder::default()));
+                self.hold(node, &entry.path())?;
+            } else {
+                let certain = fs::read(entry.path())?;
+                let length = certain.len() as u64;
+                self.nodes.push(Node::File(File {
+                    certain,
+                    length,
+                    since: Vec::new(),
+                }));
+            }
+            names.insert(entry.file_name().to_string_lossy().into_owned(), node);
+        }
+        self.nodes[at] = Node::Folder(Folder {
+            certain: names.clone(),
+            since: Vec::new(),
+            now: names,
+        });
+        Ok(())
+    }
+
     /// Carries out an operation. Operations on a file that has no name any more are ignored.
     ///
     /// # Panics
     /// If it is impossible, so the operations are not those of one run.
     pub fn apply(&mut self, operation: &Operation) {
         let done = operation.done;
+        self.operations += 1;
         match &operation.what {
             What::Open { path, empty } => {
                 if self.find(path).is_none() {
@@ -100,6 +150,11 @@ impl Disk {
             }
             What::Length { path, bytes } => self.change(done, path, Change::Length(*bytes)),
             What::Sync(path) => self.sync(operation.asked, path),
+            What::SyncAll => {
+                for at in 0..self.nodes.len() {
+                    self.sync_node(operation.asked, at);
+                }
+            }
             What::Folder(path) => {
                 self.nodes.push(Node::Folder(Folder::default()));
                 self.name(done, vec![(path, Some(self.nodes.len() - 1))]);
@@ -129,28 +184,36 @@ impl Disk {
         Some(at)
     }
 
-    fn folder(&mut self, path: &Path) -> &mut Folder {
-        let at = self.find(path).expect("the folder is there");
-        match &mut self.nodes[at] {
-            Node::Folder(folder) => folder,
-            Node::File(_) => panic!("{} is no folder", path.display()),
-        }
+    /// The folder of a name, and the name.
+    fn place<'a>(&self, path: &'a Path) -> (usize, &'a str) {
+        let folder = path.parent().and_then(|parent| self.find(parent));
+        let name = path.file_name().and_then(|name| name.to_str());
+        (
+            folder.expect("the folder is there"),
+            name.expect("a name in UTF-8"),
+        )
     }
 
-    /// Gives and removes names; within one folder this is one change.
+    /// Gives and removes names, as one change.
     fn name(&mut self, done: u64, changes: Vec<(&PathBuf, Option<usize>)>) {
         for (path, node) in changes {
-            let parent = path.parent().expect("a name stands in a folder");
-            let name = path.file_name().and_then(|name| name.to_str());
-            let name = name.expect("a name in UTF-8").to_owned();
-            let folder = self.folder(parent);
-            match node {
-                Some(node) => folder.now.insert(name.clone(), node),
-                None => folder.now.remove(&name),
+            let (at, name) = self.place(path);
+            let operation = self.operations;
+            let Node::Folder(folder) = &mut self.nodes[at] else {
+                panic!("{} is in no folder", path.display());
             };
+            match node {
+                Some(node) => folder.now.insert(name.to_owned(), node),
+                None => folder.now.remove(name),
+            };
+            let naming = (name.to_owned(), node);
             match folder.since.last_mut() {
-                Some((same, together)) if *same == done => together.push((name, node)),
-                _ => folder.since.push((done, vec![(name, node)])),
+                Some(same) if same.operation == operation => same.names.push(naming),
+                _ => folder.since.push(Renaming {
+                    operation,
+                    done,
+                    names: vec![naming],
+                }),
             }
         }
     }
@@ -171,23 +234,46 @@ impl Disk {
         let Some(at) = self.find(path) else {
             return;
         };
+        self.sync_node(asked, at);
+        for path in path.ancestors().filter(|path| path.parent().is_some()) {
+            let (folder, name) = self.place(path);
+            self.settle(folder, |change| {
+                change.done <= asked && change.names.iter().any(|(other, _)| other == name)
+            });
+        }
+    }
+
+    fn sync_node(&mut self, asked: u64, at: usize) {
         match &mut self.nodes[at] {
             Node::File(file) => {
-                let until = file
-                    .since
-                    .iter()
-                    .take_while(|(done, _)| *done <= asked)
-                    .count();
+                let done = file.since.iter().take_while(|(done, _)| *done <= asked);
+                let until = done.count();
                 for (_, change) in file.since.drain(..until) {
                     change.apply(&mut file.certain);
                 }
             }
-            Node::Folder(folder) => folder.settle(asked, |_| true),
+            Node::Folder(_) => self.settle(at, |change| change.done <= asked),
         }
-        let mut path = path;
-        while let (Some(parent), Some(name)) = (path.parent(), path.file_name()) {
-            self.folder(parent).settle(asked, |other| name == other);
-            path = parent;
+    }
+
+    /// Makes the changes of a folder certain up to the last one that is `wanted`, and with them those
+    /// of other folders that happen together with one of these.
+    fn settle(&mut self, at: usize, wanted: impl Fn(&Renaming) -> bool) {
+        let Node::Folder(folder) = &mut self.nodes[at] else {
+            return;
+        };
+        let last = folder.since.iter().rposition(wanted);
+        let mut together = Vec::new();
+        for change in folder.since.drain(..last.map_or(0, |at| at + 1)) {
+            rename(&mut folder.certain, &change.names);
+            together.push(change.operation);
+        }
+        if !together.is_empty() {
+            for other in 0..self.nodes.len() {
+                let settled: &dyn Fn(&Renaming) -> bool =
+                    &|change| together.contains(&change.operation);
+                self.settle(other, settled);
+            }
         }
     }
 
@@ -196,16 +282,66 @@ impl Disk {
     /// # Errors
     /// Those of the file system.
     pub fn leave(&self, left: &mut Left<'_>, target: &Path) -> io::Result<()> {
-        self.leave_node(0, left, target)
+        let kept = self.kept(left);
+        self.leave_node(0, &kept, left, target)
     }
 
-    fn leave_node(&self, at: usize, left: &mut Left<'_>, target: &Path) -> io::Result<()> {
+    /// Of each node that is a folder, how many of its uncertain changes are left.
+    fn kept(&self, left: &mut Left<'_>) -> Vec<usize> {
+        let all: Vec<&[Renaming]> = self
+            .nodes
+            .iter()
+            .map(|node| match node {
+                Node::Folder(folder) => &*folder.since,
+                Node::File(_) => &[],
+            })
+            .collect();
+        let mut kept: Vec<usize> = all
+            .iter()
+            .map(|changes| match left {
+                Left::All => changes.len(),
+                Left::Nothing => 0,
+                Left::Some(random) => random.below(changes.len() + 1),
+            })
+            .collect();
+        loop {
+            let lost: BTreeSet<usize> = all
+                .iter()
+                .zip(&kept)
+                .flat_map(|(changes, &kept)| &changes[kept..])
+                .map(|change| change.operation)
+                .collect();
+            let mut settled = true;
+            for (changes, kept) in all.iter().zip(&mut kept) {
+                let half = changes[..*kept]
+                    .iter()
+                    .position(|change| lost.contains(&change.operation));
+                settled &= half.is_none();
+                *kept = half.unwrap_or(*kept);
+            }
+            if settled {
+                return kept;
+            }
+        }
+    }
+
+    fn leave_node(
+        &self,
+        at: usize,
+        kept: &[usize],
+        left: &mut Left<'_>,
+        target: &Path,
+    ) -> io::Result<()> {
         match &self.nodes[at] {
             Node::File(file) => fs::write(target, file.left(left)),
             Node::Folder(folder) => {
                 fs::create_dir(target)?;
-                for (name, node) in folder.left(left) {
-                    self.leave_node(node, left, &target.join(name))?;
+                let mut names = folder.certain.clone();
+                for change in &folder.since[..kept[at]] {
+                    rename(&mut names, &change.names);
+                }
+                for (name, node) in names {
+                    self.leave_node(node, kept, left, &target.join(name))?;
                 }
                 Ok(())
             }
@@ -265,33 +401,6 @@ impl File {
             }
         }
         content
-    }
-}
-
-impl Folder {
-    /// Makes certain what was done before `asked`, up to the last change of a name that is
-    /// `wanted`.
-    fn settle(&mut self, asked: u64, wanted: impl Fn(&str) -> bool) {
-        let last = self.since.iter().rposition(|(done, names)| {
-            *done <= asked && names.iter().any(|(name, _)| wanted(name))
-        });
-        let until = last.map_or(0, |at| at + 1);
-        for (_, names) in self.since.drain(..until) {
-            rename(&mut self.certain, &names);
-        }
-    }
-
-    fn left(&self, left: &mut Left<'_>) -> Names {
-        let until = match left {
-            Left::All => self.since.len(),
-            Left::Nothing => 0,
-            Left::Some(random) => random.below(self.since.len() + 1),
-        };
-        let mut names = self.certain.clone();
-        for (_, changes) in &self.since[..until] {
-            rename(&mut names, changes);
-        }
-        names
     }
 }
 

@@ -51,6 +51,8 @@ pub enum What {
     },
     /// Syncs a file or a folder.
     Sync(PathBuf),
+    /// Syncs the whole file system.
+    SyncAll,
     /// Creates a folder.
     Folder(PathBuf),
     /// Gives a file a second name.

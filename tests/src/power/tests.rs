@@ -35,6 +35,14 @@ fn write(path: &str, bytes: &[u8]) -> What {
 /// The different contents of `name` that losses of power after all operations may leave; `None`
 /// where it does not exist.
 fn left_of(name: &str, all: Vec<What>) -> Vec<Option<Vec<u8>>> {
+    left_of_each([name], all)
+        .into_iter()
+        .map(|[content]| content)
+        .collect()
+}
+
+/// The same of several names at once.
+fn left_of_each<const N: usize>(names: [&str; N], all: Vec<What>) -> Vec<[Option<Vec<u8>>; N]> {
     let folder = tempfile::tempdir().unwrap();
     let mut disk = Disk::default();
     for operation in sequence(all) {
@@ -50,7 +58,7 @@ fn left_of(name: &str, all: Vec<What>) -> Vec<Option<Vec<u8>>> {
         };
         let target = folder.path().join(at.to_string());
         disk.leave(&mut left, &target).unwrap();
-        found.push(fs::read(target.join(name)).ok());
+        found.push(names.map(|name| fs::read(target.join(name)).ok()));
     }
     found.sort();
     found.dedup();
@@ -109,6 +117,40 @@ fn a_folder_that_is_removed_may_be_there_with_a_part_of_its_files() {
     let all = || made.iter().chain(&removed).cloned().collect();
     assert_eq!(left_of("f/1", all()), [None, Some(b"one".to_vec())]);
     assert_eq!(left_of("f/2", all()), [None, Some(b"two".to_vec())]);
+}
+
+#[test]
+fn a_rename_into_another_folder_happens_in_both_or_in_neither() {
+    let renamed = |more: &[What]| {
+        let made = [
+            What::Folder("f".into()),
+            What::Folder("g".into()),
+            open("f/a"),
+            open("g/b"),
+            What::SyncAll,
+            What::Remove("g/b".into()),
+            What::Rename {
+                from: "f/a".into(),
+                to: "g/a".into(),
+            },
+        ];
+        let all = [&made[..], more].concat();
+        left_of_each(["f/a", "g/a", "g/b"], all)
+    };
+    let is = |there: bool| there.then(Vec::new);
+    let (before, after) = (
+        [is(true), is(false), is(false)],
+        [is(false), is(true), is(false)],
+    );
+    let with_other = [is(true), is(false), is(true)];
+    assert_eq!(renamed(&[]), [after.clone(), before, with_other]);
+    // What is synced in one folder is certain in the other.
+    for synced in ["f", "g", "g/a"] {
+        assert_eq!(
+            renamed(&[What::Sync(synced.into())]),
+            std::slice::from_ref(&after)
+        );
+    }
 }
 
 #[test]

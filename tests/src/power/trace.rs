@@ -22,7 +22,7 @@ pub const OPTIONS: [&str; 11] = [
     "-q",
     "-e",
     "trace=openat,creat,open,close,write,pwrite64,writev,pwritev,pwritev2,truncate,ftruncate,fallocate,fsync,fdatasync,\
-     sync_file_range,rename,renameat,renameat2,link,linkat,symlink,symlinkat,unlink,unlinkat,mkdir,mkdirat,rmdir,\
+     syncfs,sync_file_range,rename,renameat,renameat2,link,linkat,symlink,symlinkat,unlink,unlinkat,mkdir,mkdirat,rmdir,\
      copy_file_range,sendfile,lseek",
 ];
 
@@ -204,6 +204,7 @@ fn operation(call: Call<'_>, places: &mut Places, root: &Path) -> Option<Operati
             path: file(first)?,
             bytes: arguments[1].parse().expect("a length"),
         },
+        "syncfs" => file(first).map(|_| What::SyncAll)?,
         "fsync" | "fdatasync" => What::Sync(file(first)?),
         "mkdir" => What::Folder(inside(path(first))?),
         "rename" => What::Rename {

@@ -2,6 +2,7 @@
 
 use super::{backup, collected, measured, ordered, place, seqs, started};
 use crate::page::Browser;
+use crate::power::can_trace;
 use crate::station_plc::command;
 use serde_json::{Value, json};
 use std::process::{Command, Stdio};
@@ -49,11 +50,7 @@ fn a_restore_that_is_killed_at_any_step_leaves_the_old_state_or_the_new_one_whol
 /// Kills the start that restores at the first, second and so on of these system calls, until a start
 /// is through before.
 fn killed_at_each(calls: &[&str]) {
-    let can = Command::new("strace")
-        .args(["-o", "/dev/null", "true"])
-        .output();
-    if !can.is_ok_and(|output| output.status.success()) {
-        println!("SKIPPED: strace is not there or may not trace (Debian package strace)");
+    if !can_trace() {
         return;
     }
     let place = place();

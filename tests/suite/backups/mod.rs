@@ -3,6 +3,7 @@
 
 mod hostile;
 mod killed;
+mod power;
 
 use crate::history::recording;
 use crate::page::Browser;
@@ -33,7 +34,11 @@ fn place_before(scene: &str) -> Place {
 }
 
 fn started(place: &Place) -> (Daemon, Browser) {
-    let daemon = Daemon::start(place);
+    entered(place, Daemon::start(place))
+}
+
+/// Signs in at a station that has started.
+fn entered(place: &Place, daemon: Daemon) -> (Daemon, Browser) {
     let mut browser = Browser::new(&daemon);
     match daemon.log.contains("shown this once") {
         true => {
