@@ -16,13 +16,12 @@ use std::process::Command;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use tests::files;
 use tests::power::Operation;
-use tests::power::disk::{Disk, Left};
+use tests::power::disk::Disk;
+use tests::power::losses::losses;
 use tests::power::trace::{OPTIONS, operations};
-use tests::random::Random;
 use tests::small_head::tiny_head;
 use tests::until::{PATIENCE, until};
 
-const SEED: u64 = 0x0FF_0FF;
 /// Largest count of result numbers that a loss of power may skip.
 const SKIPPED: u32 = 64;
 
@@ -190,6 +189,8 @@ struct Promise {
     next: u32,
     /// Fingerprints of the stored recipes, and of the next version if it was being stored.
     recipes: BTreeMap<u16, Vec<Option<String>>>,
+    /// How many changes of recipes by the command line were answered "done".
+    changes: u32,
     /// Whether the device was in use before.
     begun: bool,
 }
@@ -200,6 +201,7 @@ impl Promise {
             shown: 0,
             next: u32::MAX,
             recipes: BTreeMap::new(),
+            changes: 0,
             begun: false,
         };
         for (when, told) in &run.told {
@@ -220,10 +222,13 @@ impl Promise {
             let possible = promise.recipes.entry(number).or_insert_with(|| vec![None]);
             if before {
                 possible.clear();
+                promise.changes += 1;
             }
             possible.push(fingerprint);
         }
         promise.next = promise.next.min(promise.shown + 1);
+        // The station taught the first one by itself.
+        promise.changes = promise.changes.saturating_sub(1);
         promise
     }
 
@@ -239,7 +244,8 @@ impl Promise {
         let words = |error: &dyn std::fmt::Display| error.to_string();
         let folder = StateFolder::open(state).map_err(|error| words(&error))?;
         let record = ChangeRecord::of(state, 16 << 20);
-        let opened = Access::open(&state.join("access"), None, record.clone());
+        self.check_record(&record)?;
+        let opened = Access::open(&state.join("access"), None, record);
         let made = opened.map_err(|error| words(&error))?.made;
         if self.begun && made.is_some() {
             return Err("the secret is gone".into());
@@ -301,6 +307,17 @@ impl Promise {
         Ok(stored.len())
     }
 
+    fn check_record(&self, record: &ChangeRecord) -> Result<(), String> {
+        let report = record.check().map_err(|error| error.to_string())?;
+        match report.problems.is_empty() && report.lines >= self.changes {
+            true => Ok(()),
+            false => Err(format!(
+                "{} changes were done, the record: {report:?}",
+                self.changes
+            )),
+        }
+    }
+
     fn check_recipes(&self, folder: &StateFolder) -> Result<(), String> {
         let recipes = Store::of_state(folder).map_err(|failure| failure.to_string())?;
         for (&number, possible) in &self.recipes {
@@ -347,71 +364,26 @@ fn results(state: &Path) -> Result<Vec<u32>, String> {
     Ok(found.iter().rev().map(|entry| entry.seq).collect())
 }
 
-/// Replays a run, with three losses of power after every `step`-th operation. Returns how many
-/// there were.
-fn losses(run: &Run, step: usize) -> usize {
-    let folder = tempfile::tempdir().unwrap();
-    let mut random = Random::new(SEED);
-    let mut disk = Disk::default();
-    let mut broken = Vec::new();
-    let (mut losses, mut certain) = (0, 0);
-    for (at, operation) in run.operations.iter().enumerate() {
-        disk.apply(operation);
-        let next = run
-            .operations
-            .get(at + 1)
-            .map_or(u64::MAX, |next| next.done);
-        let promise = Promise::at(run, next - 1);
-        if at % step != 0 {
-            continue;
+/// Loses power after every `step`-th operation of a run.
+fn lose(run: &Run, step: usize) {
+    let mut certain = 0;
+    losses(Disk::default(), &run.operations, step, |loss, folder| {
+        let stored = Promise::at(run, loss.time).check(&folder.join("state"))?;
+        if stored < certain {
+            return Err(format!("{stored} results, {certain} were certain before"));
         }
-        for kind in 0..3 {
-            let mut left = match kind {
-                0 => Left::Nothing,
-                1 => Left::All,
-                _ => Left::Some(&mut random),
-            };
-            let target = folder.path().join(format!("{at}-{kind}"));
-            disk.leave(&mut left, &target).unwrap();
-            losses += 1;
-            match promise.check(&target.join("state")) {
-                Ok(stored) if stored < certain => {
-                    broken.push(format!(
-                        "{at}, {left:?}: {stored} results, {certain} were certain before"
-                    ));
-                }
-                Ok(stored) if kind == 0 => certain = stored,
-                Ok(_) => {}
-                Err(words) => broken.push(format!(
-                    "after {at} {:?}, kind {kind}: {words}",
-                    operation.what
-                )),
-            }
-            fs::remove_dir_all(&target).unwrap();
+        if loss.whole {
+            certain = stored;
         }
-    }
-    let first: Vec<_> = broken
-        .iter()
-        .take(20)
-        .map(|words| words.chars().take(400).collect::<String>())
-        .collect();
-    assert!(
-        broken.is_empty(),
-        "{} of {losses}: {first:#?}",
-        broken.len()
-    );
-    losses
+        Ok(())
+    });
 }
 
 #[test]
 fn a_loss_of_power_at_some_operations_leaves_what_was_promised() {
     if can_trace() {
         let run = Run::recorded();
-        let losses = losses(&run, run.operations.len() / 30);
-        println!(
-            "{losses} losses of power in {} operations",
-            run.operations.len()
-        );
+        lose(&run, run.operations.len() / 30);
     }
 }
 
@@ -419,10 +391,5 @@ fn a_loss_of_power_at_some_operations_leaves_what_was_promised() {
 #[ignore = "minutes: `.ci/run full` does it"]
 fn a_loss_of_power_at_any_operation_leaves_what_was_promised() {
     assert!(can_trace(), "strace must be there");
-    let run = Run::recorded();
-    let losses = losses(&run, 1);
-    println!(
-        "{losses} losses of power in {} operations",
-        run.operations.len()
-    );
+    lose(&Run::recorded(), 1);
 }

@@ -9,8 +9,10 @@ use super::role::Role;
 use super::users::ENGINEER;
 use crate::station::Snapshot;
 use crate::storage::folder::{rename_whole, sync_folder_of};
-use crate::storage::hex;
 use crate::storage::state::{Counter, RecordEnd};
+use crate::storage::{hex, quoted};
+use crate::system::clock::utc;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -18,6 +20,7 @@ use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
 use std::net::IpAddr;
+use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
 /// The file in the folder `access`, and the one before it.
@@ -365,13 +368,13 @@ pub fn author(line: &Value) -> String {
 /// The columns of the record as CSV (RFC 4180).
 pub const CSV_COLUMNS: &str = "number,time_utc,boot_id,uptime_s,way,from,user,role,action,subject,outcome,changed,recipe,fingerprint\r\n";
 
-/// A line of it; `time` writes µs since 1970 UTC.
-pub fn csv_line(line: &Value, time: impl Fn(u64) -> String) -> String {
+/// A line of it.
+pub fn csv_line(line: &Value) -> String {
     let keys = CSV_COLUMNS.trim_end().split(',');
     let cells = keys.map(|key| match (key, &line[key]) {
-        ("time_utc", _) => line["utc_us"].as_u64().map(&time).unwrap_or_default(),
+        ("time_utc", _) => line["utc_us"].as_u64().map(utc).unwrap_or_default(),
         (_, Value::Null) => String::new(),
-        (_, Value::String(text)) => format!("\"{}\"", text.replace('"', "\"\"")),
+        (_, Value::String(text)) => quoted(text).into_owned(),
         (_, other) => other.to_string(),
     });
     cells.collect::<Vec<_>>().join(",") + "\r\n"
@@ -396,16 +399,23 @@ pub(super) fn hash_of(line: &[u8]) -> String {
     hex(&Sha256::digest(line))
 }
 
-/// Cuts off a line that a loss of power left unfinished: nothing in it was answered.
+/// Whether this is what a loss of power leaves of a line: it has no end, or sectors of it are missing.
+/// Nothing in it was answered.
+pub(super) fn is_torn(line: &[u8]) -> bool {
+    serde_json::from_slice::<IgnoredAny>(line).is_err()
+}
+
+/// Cuts off a last line that is torn, or has no end.
 fn drop_torn(path: &Path, file: &File) -> io::Result<()> {
+    let Some(line) = Backward::of(path)?.next().transpose()? else {
+        return Ok(());
+    };
     let length = file.metadata()?.len();
     let mut last = [0];
-    if length == 0 || {
-        std::os::unix::fs::FileExt::read_exact_at(file, &mut last, length - 1)?;
-        last == *b"\n"
-    } {
-        return Ok(());
+    file.read_exact_at(&mut last, length - 1)?;
+    let ended = last == *b"\n";
+    match ended && !is_torn(&line) {
+        true => Ok(()),
+        false => file.set_len(length - line.len() as u64 - u64::from(ended)),
     }
-    let torn = Backward::of(path)?.next().transpose()?;
-    file.set_len(length - torn.map_or(0, |line| line.len() as u64))
 }

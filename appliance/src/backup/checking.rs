@@ -14,7 +14,7 @@ use crate::history::studies::Studies;
 use crate::storage::archive::Members;
 use crate::storage::folder::{check_room, read_whole};
 use std::fs::{self, File};
-use std::io::{self, Read, Seek};
+use std::io::{self, ErrorKind, Read, Seek};
 use std::path::Path;
 
 /// The most members that are read, as many as a ZIP without 64-bit sizes has.
@@ -41,14 +41,12 @@ impl Backups {
     /// Unpacks and checks a backup beside the state, in place of one that was checked before.
     ///
     /// # Errors
-    /// In words: what is wrong with it. Then the one before is gone as well, and the state untouched.
-    pub fn check(&self, archive: &Path) -> Result<CheckedBackup, String> {
-        self.forget().map_err(|error| error.to_string())?;
-        let checked = File::open(archive)
-            .map_err(|error| error.to_string())
-            .and_then(|archive| check(archive, &self.staged()));
+    /// As [`check`]. Then the one before is gone as well, and the state untouched.
+    pub fn check(&self, archive: &Path) -> io::Result<CheckedBackup> {
+        self.forget()?;
+        let checked = check(File::open(archive)?, &self.staged());
         if checked.is_err() {
-            self.forget().map_err(|error| error.to_string())?;
+            self.forget()?;
         }
         checked
     }
@@ -57,28 +55,38 @@ impl Backups {
 /// Unpacks a backup into a folder that does not exist, and checks it.
 ///
 /// # Errors
-/// In words: what is wrong with it.
-pub fn check(archive: File, into: &Path) -> Result<CheckedBackup, String> {
-    let size = archive.metadata().map_err(|error| error.to_string())?.len();
-    let mut members = Members::open(archive, MOST).map_err(|error| error.to_string())?;
-    let manifest = manifest(&mut members)?;
-    fs::create_dir_all(into).map_err(|error| error.to_string())?;
-    let folder = File::open(into).map_err(|error| error.to_string())?;
-    check_room(&folder, size).map_err(|error| format!("there is no room to unpack it: {error}"))?;
+/// What is wrong with it, or whatever the file system answers.
+pub fn check(archive: File, into: &Path) -> io::Result<CheckedBackup> {
+    let size = archive.metadata()?.len();
+    let mut members = Members::open(archive, MOST).map_err(wrong)?;
+    let manifest = manifest(&mut members).map_err(wrong)?;
+    fs::create_dir_all(into)?;
+    let folder = File::open(into)?;
+    check_room(&folder, size).map_err(|error| within("there is no room to unpack it", &error))?;
     for member in &manifest.members {
         let name = &member.name;
         let unpacked = unpack(&mut members, name, into);
-        let (bytes, sha256) = unpacked.map_err(|error| format!("member {name}: {error}"))?;
+        let (bytes, sha256) =
+            unpacked.map_err(|error| within(&format!("member {name}"), &error))?;
         if (bytes, &sha256) != (member.bytes, &member.sha256) {
-            return Err(format!(
+            return Err(wrong(format!(
                 "member {name} is not what the manifest says: it was damaged or changed"
-            ));
+            )));
         }
     }
-    let checked = formats(manifest, into)?;
+    let checked = formats(manifest, into).map_err(wrong)?;
     // Nothing of it may be missing after a loss of power.
-    rustix::fs::syncfs(&folder).map_err(|error| error.to_string())?;
+    rustix::fs::syncfs(&folder)?;
     Ok(checked)
+}
+
+fn wrong(words: impl ToString) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, words.to_string())
+}
+
+/// The same error, with where it was met.
+fn within(place: &str, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{place}: {error}"))
 }
 
 /// Reads the manifest, and checks that it names every member of the ZIP and no other, each once.

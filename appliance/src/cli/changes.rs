@@ -5,8 +5,9 @@ use super::numbers::number;
 use super::options::{Files, Json};
 use crate::access::record::{CSV_COLUMNS, RecordFilter, author, csv_line};
 use crate::error::{Exit, Result};
-use crate::history::export::{utc, utc_us};
+use crate::history::export::utc_us;
 use crate::station::control::MAX_RECIPE;
+use crate::system::clock::utc;
 use serde_json::{Value, json};
 
 /// Show or check the record of changes, newest first.
@@ -79,7 +80,7 @@ impl Changes {
         if self.csv {
             say!("{}", CSV_COLUMNS.trim_end());
             let print = |line: Value| {
-                say!("{}", csv_line(&line, utc).trim_end());
+                say!("{}", csv_line(&line).trim_end());
                 true
             };
             return record.each(&filter, print).map_err(failed);

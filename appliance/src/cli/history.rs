@@ -8,6 +8,7 @@ use crate::history::{Entry, Filter, HistoryError, Reader, export};
 use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
 use crate::station::gauge::decision;
+use crate::system::clock;
 use crate::system::journal::{self, Severity};
 use std::io::{self, BufWriter, StdoutLock, Write};
 
@@ -180,7 +181,7 @@ impl From<HistoryError> for Failure {
 /// The time of a result, to the second: by the clock, else by a browser's clock, else since the
 /// start of the daemon.
 fn moment(entry: &Entry) -> String {
-    let second = |us| format!("{:.19}", export::utc(us));
+    let second = |us| format!("{:.19}", clock::utc(us));
     match (entry.time_utc_us, entry.browser_utc_us) {
         (Some(us), _) => second(us),
         (None, Some(us)) => format!("≈{}", second(us)),

@@ -6,8 +6,9 @@ use super::carry::{self, EarlierHistory};
 use super::entry::{Entry, Filter};
 use super::reader::{Reader, condition, read, rows};
 use super::{HistoryError, HistoryResult};
+use crate::storage::quoted;
+use crate::system::clock::utc;
 use rusqlite::{Connection, Transaction, params_from_iter};
-use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::PathBuf;
@@ -254,45 +255,6 @@ pub(super) fn number(number: Option<f64>) -> String {
     number.map_or_else(String::new, |number| number.to_string())
 }
 
-/// A text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe
-/// in front.
-pub(super) fn quoted(text: &str) -> Cow<'_, str> {
-    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
-    let guard = if formula { "'" } else { "" };
-    if formula || text.contains([',', '"', '\r', '\n']) {
-        format!("\"{guard}{}\"", text.replace('"', "\"\"")).into()
-    } else {
-        text.into()
-    }
-}
-
-/// A time in µs since 1970 UTC as text. Years after 9999 have a sign, as ISO 8601 asks for.
-pub fn utc(us: u64) -> String {
-    let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
-    let (year, month, day) = civil(days);
-    let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
-    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
-    let sign = if year > 9999 { "+" } else { "" };
-    format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
-}
-
-/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible
-/// low-level date algorithms", `civil_from_days`, for days that are not negative).
-fn civil(days: u64) -> (u64, u64, u64) {
-    let shifted = days + 719_468;
-    let (era, day) = (shifted / 146_097, shifted % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let of_month = day - (153 * month + 2) / 5 + 1;
-    let (month, carry) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
-    (era * 400 + year + carry, month, of_month)
-}
-
 /// A text that is not a date or time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("write a date or time since 1970 as 2026-11-21 or 2026-11-21T16:30:00Z")]
@@ -345,12 +307,5 @@ mod tests {
         for wrong in ["", "yesterday", "12", "2026-13-01", "1969-12-31"] {
             assert!(utc_us(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn a_text_is_quoted_where_it_must_be_and_is_no_formula() {
-        assert_eq!(quoted("plain"), "plain");
-        assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
-        assert_eq!(quoted("=1+1"), "\"'=1+1\"");
     }
 }

@@ -7,9 +7,10 @@
 
 use super::design::{StudyDesign, StudyTrial};
 use super::entry::{Entry, GaugeEntry};
-use super::export::{number, quoted};
+use super::export::number;
 use crate::station::gauge::decision;
 use crate::storage::folder::{read_whole, remove, write_whole};
+use crate::storage::quoted;
 use crate::study::{Repeatability, StudyLimits, table};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;

@@ -58,6 +58,33 @@ pub fn of_browser(ms: u64) -> Option<u64> {
         .then(|| ms * 1000)
 }
 
+/// A time in µs since 1970 UTC as text. Years after 9999 have a sign, as ISO 8601 asks for.
+pub fn utc(us: u64) -> String {
+    let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
+    let (year, month, day) = civil(days);
+    let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
+    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    let sign = if year > 9999 { "+" } else { "" };
+    format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
+}
+
+/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible
+/// low-level date algorithms", `civil_from_days`, for days that are not negative).
+fn civil(days: u64) -> (u64, u64, u64) {
+    let shifted = days + 719_468;
+    let (era, day) = (shifted / 146_097, shifted % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let of_month = day - (153 * month + 2) / 5 + 1;
+    let (month, carry) = if month < 10 {
+        (month + 3, 0)
+    } else {
+        (month - 9, 1)
+    };
+    (era * 400 + year + carry, month, of_month)
+}
+
 /// Whether the kernel says that the clock is disciplined by a time service.
 #[cfg(target_os = "linux")]
 #[expect(
@@ -81,7 +108,6 @@ fn synchronised() -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::export::utc;
 
     #[test]
     fn bounds_of_believable_times_are_those_of_the_calendar() {

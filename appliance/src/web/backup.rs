@@ -1,7 +1,7 @@
 //! Backups: one is made and sent while the station runs, one that comes is checked, and what is to come
 //! back is ordered for the next start.
 
-use super::downloads::sent_alone;
+use super::downloads::{attachment, sent_alone};
 use super::gate::Changed;
 use super::orders::{Accepted, accepted};
 use super::problem::{Answered, Problem};
@@ -14,10 +14,9 @@ use crate::backup::plan::Present;
 use crate::system::computing;
 use axum::Extension;
 use axum::extract::Request;
-use axum::http::header;
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::Value;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::time::Duration;
 use tokio::sync::OwnedMutexGuard;
 
@@ -45,7 +44,7 @@ async fn one(site: &Site) -> Answered<OwnedMutexGuard<()>> {
 pub(super) async fn make(site: Site, Query(wanted): Query<BackupContents>) -> Answered<Response> {
     let turn = one(&site).await?;
     let serial = site.station.snapshot().identity.serial.clone();
-    let name = format!("attachment; filename=\"fringed-{serial}-backup.zip\"");
+    let headers = attachment("application/zip", &format!("fringed-{serial}-backup.zip"));
     let failed = "making the backup failed; see the log";
     let body = sent_alone("backing up", failed, move |mut to, begun| {
         let _turn = turn;
@@ -67,10 +66,6 @@ pub(super) async fn make(site: Site, Query(wanted): Query<BackupContents>) -> An
             }
         }
     });
-    let headers = [
-        (header::CONTENT_TYPE, "application/zip".to_owned()),
-        (header::CONTENT_DISPOSITION, name),
-    ];
     Ok((headers, body.await?).into_response())
 }
 
@@ -109,7 +104,13 @@ pub(super) async fn check(site: Site, request: Request) -> Answered<Json<Value>>
 }
 
 fn checked(site: &Site, archive: &std::path::Path) -> Answered<()> {
-    let refused = |words| Problem::unfit(format!("restore: {words}"));
+    let refused = |error: io::Error| {
+        let words = format!("restore: {error}");
+        match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Problem::unstored(words, &error),
+            _ => Problem::unfit(words),
+        }
+    };
     let checked = site.backups.check(archive).map_err(refused)?;
     let snapshot = site.station.snapshot();
     let calibration = site.calibration.get();

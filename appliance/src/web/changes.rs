@@ -1,13 +1,11 @@
 //! The record of changes: a list, newest first, and all of it as CSV.
 
-use super::downloads::ToClient;
+use super::downloads::{ToClient, attachment};
 use super::look::dated;
 use super::problem::{Answered, Problem};
 use super::request::Query;
 use super::site::Site;
 use crate::access::record::{CSV_COLUMNS, RecordFilter, csv_line};
-use crate::history::export::utc;
-use axum::http::header;
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::{Value, json};
 use std::io::Write as _;
@@ -49,19 +47,13 @@ pub(super) async fn csv(site: Site, Query(filter): Query<RecordFilter>) -> Answe
         let written = to.write_all(CSV_COLUMNS.as_bytes()).and_then(|()| {
             let mut sent = Ok(());
             let read = record.each(&filter, |line| {
-                sent = to.write_all(csv_line(&line, utc).as_bytes());
+                sent = to.write_all(csv_line(&line).as_bytes());
                 sent.is_ok()
             });
             read.and(sent)
         });
         to.end(written);
     });
-    let headers = [
-        (header::CONTENT_TYPE, "text/csv; charset=utf-8"),
-        (
-            header::CONTENT_DISPOSITION,
-            "attachment; filename=\"changes.csv\"",
-        ),
-    ];
+    let headers = attachment("text/csv; charset=utf-8", "changes.csv");
     Ok((headers, body).into_response())
 }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
-use axum::http::header;
+use axum::http::{HeaderName, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::sync::mpsc::{self, error::TrySendError};
@@ -97,15 +97,17 @@ pub(super) async fn send(
         let written = content.write(&mut to);
         to.end(written);
     });
-    let headers = [
-        (header::CONTENT_TYPE, kind.to_owned()),
-        (
-            header::CONTENT_DISPOSITION,
-            format!("attachment; filename=\"{name}\""),
-        ),
-    ];
     let length = length.map(|bytes| [(header::CONTENT_LENGTH, bytes.to_string())]);
-    Ok((headers, length, body).into_response())
+    Ok((attachment(kind, &name), length, body).into_response())
+}
+
+/// The headers of a file that the browser keeps under this name.
+pub(super) fn attachment(kind: &str, name: &str) -> [(HeaderName, String); 2] {
+    let disposition = format!("attachment; filename=\"{name}\"");
+    [
+        (header::CONTENT_TYPE, kind.to_owned()),
+        (header::CONTENT_DISPOSITION, disposition),
+    ]
 }
 
 /// The files of a folder, to be sent as a ZIP piece by piece: a recording with its recipe is too

@@ -1,6 +1,7 @@
 //! The head: its commissioning step by step, the board to print for it, the live picture, and the part
 //! in front of a simulated one.
 
+use super::downloads::attachment;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Answered, Problem};
 use super::request::{self, Path, Query};
@@ -213,14 +214,7 @@ pub(super) async fn board_pdf(Query(wanted): Query<BoardQuery>) -> Answered<Resp
     let board =
         board::parse(&wanted.board).map_err(|error| Problem::unclear(format!("board: {error}")))?;
     let sheet = sheet(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;
-    let headers = [
-        (header::CONTENT_TYPE, "application/pdf"),
-        (
-            header::CONTENT_DISPOSITION,
-            "attachment; filename=\"board.pdf\"",
-        ),
-    ];
-    Ok((headers, sheet.pdf).into_response())
+    Ok((attachment("application/pdf", "board.pdf"), sheet.pdf).into_response())
 }
 
 impl From<PutError> for Problem {

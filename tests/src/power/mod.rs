@@ -2,9 +2,10 @@
 //! of its operations.
 //!
 //! [`trace`] reads the operations from a log of `strace`; [`disk`] models which of them are
-//! certainly on the medium and which may be lost.
+//! certainly on the medium and which may be lost; [`losses`] replays a run.
 
 pub mod disk;
+pub mod losses;
 pub mod trace;
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use appliance::backup::checking::{CheckedBackup, check};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
+use std::io;
 use std::time::{Duration, Instant};
 use tests::files;
 use tests::small_head::tiny_head;
@@ -64,7 +65,7 @@ fn backup(browser: &mut Browser, more: &str) -> Vec<u8> {
     zip
 }
 
-fn checked(zip: &[u8]) -> (tempfile::TempDir, Result<CheckedBackup, String>) {
+fn checked(zip: &[u8]) -> (tempfile::TempDir, io::Result<CheckedBackup>) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("backup.zip");
     fs::write(&file, zip).unwrap();

@@ -16,11 +16,9 @@ use std::fs;
 use std::path::Path;
 use tests::files;
 use tests::power::Operation;
-use tests::power::disk::{Disk, Left};
+use tests::power::disk::Disk;
+use tests::power::losses::losses;
 use tests::power::trace::operations;
-use tests::random::Random;
-
-const SEED: u64 = 0x0FF_0FF;
 
 /// What is exchanged, file by file, and the results.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -162,6 +160,10 @@ impl Run {
         let restored = Backups::of(state).carry_out(&folder, &record, None);
         forget(&serial);
         restored.map_err(|error| words(&error))?;
+        let report = record.check().map_err(|error| words(&error))?;
+        if !report.problems.is_empty() {
+            return Err(format!("{report:?}"));
+        }
         let found = Exchanged::of(state);
         let possible = self.possible(time);
         if !possible.contains(&&found) {
@@ -181,54 +183,16 @@ impl Run {
             false => Ok(()),
         }
     }
-
-    /// Replays the run, with three losses of power after each operation; how many.
-    fn losses(mut self) -> usize {
-        let folder = tempfile::tempdir().unwrap();
-        let mut random = Random::new(SEED);
-        let mut disk = std::mem::take(&mut self.before);
-        let mut broken = Vec::new();
-        let mut losses = 0;
-        for (at, operation) in self.operations.iter().enumerate() {
-            disk.apply(operation);
-            let next = self.operations.get(at + 1);
-            let time = next.map_or(u64::MAX, |next| next.done) - 1;
-            for kind in 0..3 {
-                let mut left = match kind {
-                    0 => Left::Nothing,
-                    1 => Left::All,
-                    _ => Left::Some(&mut random),
-                };
-                let target = folder.path().join(format!("{at}-{kind}"));
-                disk.leave(&mut left, &target).unwrap();
-                losses += 1;
-                if let Err(words) = self.check(&target.join("state"), time) {
-                    broken.push(format!(
-                        "after {at} {:?}, kind {kind}: {words}",
-                        operation.what
-                    ));
-                }
-                fs::remove_dir_all(&target).unwrap();
-            }
-        }
-        let first = broken
-            .iter()
-            .take(5)
-            .map(|words| words.chars().take(600).collect());
-        let first: Vec<String> = first.collect();
-        let count = broken.len();
-        assert!(broken.is_empty(), "{count} of {losses}: {first:#?}");
-        println!(
-            "{losses} losses of power in {} operations",
-            self.operations.len()
-        );
-        losses
-    }
 }
 
 #[test]
 fn a_loss_of_power_at_any_operation_leaves_the_old_state_or_the_new_one() {
     if can_trace() {
-        assert!(Run::recorded().losses() > 1000);
+        let mut run = Run::recorded();
+        let before = std::mem::take(&mut run.before);
+        let count = losses(before, &run.operations, 1, |loss, folder| {
+            run.check(&folder.join("state"), loss.time)
+        });
+        assert!(count > 1000);
     }
 }
