@@ -69,6 +69,7 @@ impl ChangeRecord {
         let (mut after, mut kept_from): (Option<Link>, Option<u32>) = (None, None);
         for line in self.backward()? {
             let line = line?;
+            // If it was answered, result-seq says that it is missing.
             if after.is_none() && is_torn(&line) {
                 continue;
             }

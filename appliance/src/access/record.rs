@@ -229,11 +229,11 @@ impl ChangeRecord {
             .read(true)
             .append(true)
             .open(&path)?;
-        drop_torn(&path, &file)?;
+        let said = self.counter.record_end().unwrap_or_default();
+        self.drop_torn(&file, said.number)?;
         let begins = file.metadata()?.len() == 0;
         let written = self.last()?;
         // Where the card says more than the file has, lines were cut off: numbers go on behind them.
-        let said = self.counter.record_end().unwrap_or_default();
         let RecordEnd { number, hash } = match said.number > written.number {
             true => said,
             false => written,
@@ -257,6 +257,24 @@ impl ChangeRecord {
             // A damaged counter is put aside at the next start.
             Err(error) if error.kind() == ErrorKind::InvalidData => Ok(()),
             stored => stored,
+        }
+    }
+
+    /// Cuts off a last line that has no end, or is torn and was never answered: `said` is the number of
+    /// the last one that was.
+    fn drop_torn(&self, file: &File, said: u32) -> io::Result<()> {
+        let Some(line) = Backward::of(&self.path(FILES[0]))?.next().transpose()? else {
+            return Ok(());
+        };
+        let before = self.backward()?.nth(1).transpose()?;
+        let before = before.and_then(|line| number_of(&line)).unwrap_or(0);
+        let length = file.metadata()?.len();
+        let mut end = [0];
+        file.read_exact_at(&mut end, length - 1)?;
+        let ended = end == *b"\n";
+        match ended && !(is_torn(&line) && said <= before) {
+            true => Ok(()),
+            false => file.set_len(length - line.len() as u64 - u64::from(ended)),
         }
     }
 
@@ -399,23 +417,7 @@ pub(super) fn hash_of(line: &[u8]) -> String {
     hex(&Sha256::digest(line))
 }
 
-/// Whether this is what a loss of power leaves of a line: it has no end, or sectors of it are missing.
-/// Nothing in it was answered.
+/// Whether a line may be what a loss of power left: its end or sectors of it are missing.
 pub(super) fn is_torn(line: &[u8]) -> bool {
     serde_json::from_slice::<IgnoredAny>(line).is_err()
-}
-
-/// Cuts off a last line that is torn, or has no end.
-fn drop_torn(path: &Path, file: &File) -> io::Result<()> {
-    let Some(line) = Backward::of(path)?.next().transpose()? else {
-        return Ok(());
-    };
-    let length = file.metadata()?.len();
-    let mut last = [0];
-    file.read_exact_at(&mut last, length - 1)?;
-    let ended = last == *b"\n";
-    match ended && !is_torn(&line) {
-        true => Ok(()),
-        false => file.set_len(length - line.len() as u64 - u64::from(ended)),
-    }
 }

@@ -276,6 +276,22 @@ fn what_a_loss_of_power_leaves_of_the_last_line_is_dropped() {
 }
 
 #[test]
+fn a_last_line_that_was_answered_and_then_damaged_is_kept_and_said_to_be_missing() {
+    let (folder, record) = nine();
+    let path = folder.path().join("access").join(FILES[0]);
+    let damaged = fs::read_to_string(&path)
+        .unwrap()
+        .replace("{\"number\":9", "{number:9");
+    fs::write(&path, &damaged).unwrap();
+    for problem in ["line 9 is missing at the end", "line 9 is missing"] {
+        let problems = record.check().unwrap().problems;
+        assert!(problems.contains(&problem.to_owned()), "{problems:?}");
+        record.add(&change("recipes/7/load")).unwrap();
+    }
+    assert!(fs::read_to_string(&path).unwrap().starts_with(&damaged));
+}
+
+#[test]
 fn changes_are_read_back_newest_first_and_filtered() {
     let (_folder, record) = nine();
     record.add(&change("recipes/7/load")).unwrap();
