@@ -372,7 +372,7 @@ fn lose(run: &Run, step: usize) {
         if stored < certain {
             return Err(format!("{stored} results, {certain} were certain before"));
         }
-        if loss.whole {
+        if loss.leaves_nothing {
             certain = stored;
         }
         Ok(())

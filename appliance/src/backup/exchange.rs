@@ -20,6 +20,7 @@ use crate::storage::folder::{read_whole, remove, rename_whole, sync_folder_of, w
 use crate::storage::state::{Counted, SERIAL, StateFolder, random};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use std::fmt::Display;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
@@ -300,7 +301,11 @@ impl Backups {
         record: &ChangeRecord,
         utc_s: Option<u64>,
     ) -> std::result::Result<(), String> {
-        self.prepare(state, order, utc_s)?;
+        let words = |error: &dyn Display| {
+            format!("{error}: see that the storage is sound and has room, and order it again")
+        };
+        let prepared = self.prepare(state, order, utc_s);
+        prepared.map_err(|error| words(&error))?;
         let begun = || {
             for item in &order.items {
                 let goes = self.before().join(&item.name);
@@ -315,10 +320,9 @@ impl Backups {
                 ..Change::of_command("restore", order.what.word().into())
             })
         };
-        let words = |error: io::Error| format!("{error}: free space, and order it again");
-        begun().map_err(words)?;
+        begun().map_err(|error| words(&error))?;
         order.begun = true;
-        self.write(ORDER, order).map_err(words)
+        self.write(ORDER, order).map_err(|error| words(&error))
     }
 
     /// Sees to the place of the state before, and to numbers and id of the history. Repeated after a

@@ -12,7 +12,7 @@ use crate::storage::folder::write_whole_with;
 use crate::storage::state::StateFolder;
 use crate::system::computing;
 use std::fs::File;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
 /// Back up recipes, calibration, history and record of changes, also while a station runs, or check a
@@ -41,8 +41,8 @@ impl Backup {
     /// Makes or checks it.
     ///
     /// # Errors
-    /// If there is no state (66), the backup cannot be written (73), or what is checked is damaged or
-    /// no backup (65).
+    /// If there is no state (66), the backup cannot be written or there is no room to unpack it (73),
+    /// or what is checked is damaged or no backup (65).
     pub fn run(&self) -> Result<()> {
         match self.check {
             true => self.checked(),
@@ -87,7 +87,10 @@ impl Backup {
         let archive = File::open(&self.file).map_err(Exit::Missing.because(&what))?;
         let scratch = Scratch::new()?;
         let checked = check(archive, &scratch.path().join("backup"));
-        let checked = checked.map_err(Exit::Content.because(&what))?;
+        let checked = checked.map_err(|error| match error.kind() {
+            ErrorKind::StorageFull => Exit::CannotCreate.because(&what)(error),
+            _ => Exit::Content.because(&what)(error),
+        })?;
         self.quiet.say(|| {
             let results = checked.history.map_or(0, |history| history.results);
             format!(

@@ -1,9 +1,9 @@
 //! A model of a file system that loses power.
 //!
 //! Changes that have not been synced may be lost: of a file any of its writes, sector by sector; of
-//! a folder its latest changes of names, in their order; a rename from one folder into another happens
-//! in both or in neither. Syncing a file also keeps its own name and
-//! those of the folders above it, as the journals of ext4, XFS and btrfs do, but no other files.
+//! a folder its latest changes of names, in their order; a rename from one folder into another
+//! happens in both or in neither. Syncing a file also keeps its own name and those of the folders
+//! above it, as the journals of ext4, XFS and btrfs do, but no other files.
 //! Mapped shared memory is never on the medium.
 
 use super::{Operation, What};
@@ -88,7 +88,7 @@ impl Default for Disk {
 }
 
 impl Disk {
-    /// A copy of a folder; all that is in it is certainly on the medium.
+    /// A copy of a folder, of which everything is certainly on the medium.
     ///
     /// # Errors
     /// Those of the file system.

@@ -16,8 +16,8 @@ const LONGEST: usize = 400;
 pub struct Loss {
     /// When: just before the next operation, µs since 1970.
     pub time: u64,
-    /// Whether all that was not certain is lost.
-    pub whole: bool,
+    /// Whether nothing is left of what was not certain.
+    pub leaves_nothing: bool,
 }
 
 /// Replays a run on a disk, with three losses of power after every `step`-th operation, of which
@@ -51,8 +51,11 @@ pub fn losses(
             let target = folder.path().join(format!("{at}-{kind}"));
             disk.leave(&mut left, &target).expect("what is left");
             losses += 1;
-            let whole = kind == 0;
-            if let Err(words) = check(Loss { time, whole }, &target) {
+            let loss = Loss {
+                time,
+                leaves_nothing: kind == 0,
+            };
+            if let Err(words) = check(loss, &target) {
                 broken.push(format!("{at}, {kind}: {words}, after {:?}", operation.what));
             }
             fs::remove_dir_all(&target).expect("removed");
