@@ -253,12 +253,20 @@ try {
     assert.match(await page.textContent("#other-words"), /^PASS no\. \d+ is of recipe 7 · .*; recipe 1 · .* is active$/);
     assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector("#other")).opacity), "1");
     assert.doesNotMatch(await page.title(), /PASS/);
-    if (folder) {
-      await page.screenshot({ path: `${folder}/other-desktop-light.png` });
-      await page.setViewportSize({ width: 390, height: 844 });
-      await page.screenshot({ path: `${folder}/other-phone-light.png` });
-      await page.setViewportSize({ width: 1280, height: 800 });
+    if (folder) await page.screenshot({ path: `${folder}/other-desktop-light.png` });
+    await page.setViewportSize({ width: 390, height: 844 });
+    for (const name of ["recipes", "live"]) {
+      await page.click(`nav a[href='#${name}']`);
+      await page.waitForSelector(`body[data-view=${name}]`);
+      if (folder) await page.screenshot({ path: `${folder}/other-phone-${name}.png` });
+      const cut = await page.evaluate(() => {
+        const whole = document.querySelector("#verdict").getBoundingClientRect();
+        const parts = [...document.querySelectorAll("#other > *")].map((part) => part.getBoundingClientRect());
+        return parts.filter((part) => part.top < whole.top || part.bottom > whole.bottom || part.left < whole.left || part.right > whole.right).length;
+      });
+      assert.equal(cut, 0, `the cover is cut off on a phone in ${name}`);
     }
+    await page.setViewportSize({ width: 1280, height: 800 });
     await trigger();
     await page.waitForSelector("body:not(.other)");
     assert.match(await page.textContent("#recipe-name"), /^recipe 1 · /);
